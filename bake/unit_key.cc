@@ -4,7 +4,9 @@
 
 #include "bake/bake_request.h"
 #include "engine/common/content_hash.h"
+#include "engine/dem/content_below.h"
 #include "engine/dem/planned_tiles.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/mercator_grid.h"
 #include "engine/geo/tile_cover.h"
 
@@ -76,7 +78,7 @@ void AddMercatorContent(dem::ContentHasher& hasher, const dem::ElevationModel& m
   for (const geo::TileRange& range : dem::TilesOverlapping(box, level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x - 1; x <= range.end_x + 1; ++x) {
-        hasher.Add(model.ContentBelow({level, dem::FloorMod(x, geo::TileColumns(level)), y}, level));
+        hasher.Add(ContentBelow(model, {level, dem::FloorMod(x, geo::TileColumns(level)), y}, level));
       }
     }
   }
@@ -106,10 +108,10 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   } else if (manifest.kind.format == tiler::TileFormat::kHeightPng) {
     AddMercatorContent(hasher, model, *unit.root);
   } else {
-    hasher.Add(model.ContentBelow(*unit.root, last));
+    hasher.Add(ContentBelow(model, *unit.root, last));
     if (manifest.kind.extensions.metadata) {
       // Metadata lists the dataset's tiles below a tile.
-      const int deepest = static_cast<int>(model.AvailabilityToDepthOf(*unit.root).size()) - 1;
+      const int deepest = static_cast<int>(dem::TileEdits(model).AvailabilityToDepthOf(*unit.root).size()) - 1;
       for (int level = unit.root->level; level <= deepest; ++level) {
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;

@@ -10,7 +10,7 @@
 namespace terrace::bake {
 
 // Hashes everything that the bytes of a unit's file depend on: the contents of the sources within reach of its tiles
-// (ElevationModel::ContentBelow), the program and its libraries, the kind of tiles, the options of the dataset that
+// (dem::ContentBelow), the program and its libraries, the kind of tiles, the options of the dataset that
 // this kind depends on, the errors of the tiles, and which tiles there are. The top unit depends on all sources.
 std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& manifest, const Unit& unit);
 

@@ -4,6 +4,7 @@
 #include <xxhash.h>
 
 #include "engine/common/content_hash.h"
+#include "engine/dem/tile_edits.h"
 #include "tiler/encoder_version.h"
 #include "tiler/map/contour_tile.h"
 #include "tiler/map/map_heights.h"
@@ -44,12 +45,13 @@ std::uint64_t GenerationOf(const Dataset& dataset, std::uint64_t heights) {
 }
 
 std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request) {
+  const dem::TileEdits edits(model);
   int size = request.side_px, margin = 0;
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
-      return request.extensions.metadata ? Mixed(model.EditsHash(request.key), model.DeeperTilesHash(request.key))
-                                         : model.EditsHash(request.key);
+      return request.extensions.metadata ? Mixed(edits.Hash(request.key), edits.DeeperTilesHash(request.key))
+                                         : edits.Hash(request.key);
     case TileFormat::kImagery:
     case TileFormat::kGeodeticImagery:
       return 0;
@@ -66,7 +68,7 @@ std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest&
   }
   const MapWindow window(request.key, size, margin);
   if (window.depth > model.info().max_mercator_depth) return 0;
-  return model.MercatorEditsHash(window.depth, window.nodes);
+  return edits.MercatorHash(window.depth, window.nodes);
 }
 
 }  // namespace terrace::tiler

@@ -29,7 +29,8 @@ struct WaterOptions {
 // The image of textures of GLB tiles and of map tiles. `texture` and `side` are of GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
-  // For whoever makes requests: the server if a client names none, and bakes. TilePipeline uses TileRequest::texture.
+  // The default for TileRequest::texture: bakes use it, and the server if a client names no texture. TilePipeline reads
+  // only TileRequest::texture.
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;
   int side = 512;    // pixels along a tile's edge, at most: a power of two from 64 to 1024
   int quality = 80;  // of JPEG and lossy WebP: 1 .. 100
@@ -49,8 +50,8 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
-  // Of GLB tiles. `compression` is for whoever makes requests, as ImageryOptions::texture; TilePipeline uses
-  // TileRequest::compression. It sets the copyright, the texture, `draco.uv` and both errors itself.
+  // Of GLB tiles. `compression` is a default for requests, as ImageryOptions::texture. TilePipeline sets the
+  // copyright, the texture, `draco.uv` and both errors itself.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none
@@ -59,12 +60,13 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
   // Identifies the dataset and its contents in caches: GenerationOf with ElevationModel::fingerprint. 0: TilePipeline
-  // uses the dataset's position instead, counted from 1 (datasets() has that number). It is not unique: no other
-  // pipeline may then use the same RefinementCache, TileTiers or TileStore, neither at the same time nor later.
+  // sets it to the dataset's position, counted from 1, in its datasets(). Positions are not unique across pipelines:
+  // then no other pipeline may use the same RefinementCache, TileTiers or TileStore, neither at the same time nor
+  // later.
   std::uint64_t generation = 0;
   // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
   // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,
-  // ElevationModel::EditsHash for refinements.
+  // dem::TileEdits::Hash for refinements.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`

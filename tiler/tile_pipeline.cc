@@ -7,11 +7,12 @@
 
 #include "engine/core/check.h"
 #include "engine/core/elapsed_time.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/bound_minus_rounding.h"
+#include "tiler/mesh/bound_at_samples.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/refinement_cache.h"
@@ -76,7 +77,7 @@ HasTile TilesOf(const Dataset& dataset) {
 // the result if it reaches the error.
 Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& dataset, const geo::TileKey& key,
                               double error_m, EncodedTile& encoded, const std::stop_token& stop) {
-  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.model->EditsHash(key)};
+  const RefinedTileKey cache_key{dataset.cache_generation(), key, dem::TileEdits(*dataset.model).Hash(key)};
   const RefinedTilePtr known = refinements.Find(cache_key);
   encoded.refinement_use = known ? RefinementUse::kContinued : RefinementUse::kMade;
   if (known && known->error_m <= error_m) {
@@ -124,7 +125,7 @@ Result<DrawnTriangles> TrianglesOf(RefinementCache& refinements, const Dataset& 
     return DecodeTriangles(baked->bytes, request.key);
   }
   const double error_m =
-      BoundMinusRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+      BoundAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(refinements, dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
@@ -196,7 +197,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = BoundMinusRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = BoundAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(*refinements_, dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);

@@ -37,7 +37,7 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. Heights that an edit sets are stated in a datum too: reads in kOrthometric or kSource
-// give them unchanged if all sources within reach of the edit have that datum and, for kSource, the floor has it too.
+// give them unchanged if the edit's datum is also that of all sources within its reach and, for kSource, of the floor.
 // Otherwise they are converted to the ellipsoid and back, which may change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
@@ -197,34 +197,12 @@ struct TileHeights {
   std::vector<float> heights;  // stride * stride
   // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
   // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
-  // it bounds the distance from the blended heights as well. Where edits apply, the samples count after the same edits.
-  // Infinite: no bound is known.
+  // it bounds the distance from the blended heights as well. Where edits apply, the distance is to the samples after
+  // these edits. Infinite: no bound is known.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const { return heights[IndexAt(i + 1, j + 1, stride)]; }
-};
-
-// An edit, to be drawn.
-struct EditOutline {
-  std::string op;  // "flatten"
-  std::string file;
-  std::size_t feature = 0;
-  bool is_area = true;                          // closed rings; else lines
-  std::vector<std::vector<GeoPosition>> lines;  // closed rings repeat the first position
-};
-
-// What edits require of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is
-// empty if nothing is required of it. Depends on the nodes' positions and their level alone.
-struct MeshDemands {
-  std::vector<float> weights;        // the error counts this many times; at least 1
-  std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As many as `weights`
-  std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  // 1: in an edit with the operation "hole" (not a void). A triangle is left out if each node that it covers, corners
-  // included, is in such a hole or forced, and at least one is in the hole.
-  std::vector<std::uint8_t> no_triangles;
-
-  bool any() const { return !weights.empty() || !forced.empty() || !no_triangles.empty(); }
 };
 
 }  // namespace terrace::dem

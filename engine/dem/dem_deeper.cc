@@ -5,6 +5,7 @@
 
 #include "engine/common/content_hash.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/edits/deeper_tiles.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/mosaic/availability.h"
@@ -52,15 +53,15 @@ void ElevationModel::Impl::AddDeeperLevels(double error_fraction) {
   }
 }
 
-std::uint64_t ElevationModel::DeeperTilesHash(const geo::TileKey& key) const {
-  if (!geo::IsValid(key) || key.level >= static_cast<int>(impl_->above_added.size())) return 0;
-  const auto& touched = impl_->above_added[static_cast<std::size_t>(key.level)];
+std::uint64_t TileEdits::DeeperTilesHash(const geo::TileKey& key) const {
+  if (!geo::IsValid(key) || key.level >= static_cast<int>(model_.above_added.size())) return 0;
+  const auto& touched = model_.above_added[static_cast<std::size_t>(key.level)];
   if (!geo::Contains(touched, key)) return 0;
-  const Impl::HashKey memo_key = {key.level, key.x, key.y, -1, -1};
-  if (const auto known = impl_->KnownHash(memo_key)) return *known;
+  const ElevationModel::Impl::HashKey memo_key = {key.level, key.x, key.y, -1, -1};
+  if (const auto known = model_.KnownHash(memo_key)) return *known;
   ContentHasher hasher;
-  for (int level = key.level + 1; level <= max_level(); ++level) {
-    const std::vector<geo::TileRange> tiles = Below(impl_->available[static_cast<std::size_t>(level)], key, level);
+  for (int level = key.level + 1; level <= model_.info.max_level; ++level) {
+    const std::vector<geo::TileRange> tiles = Below(model_.available[static_cast<std::size_t>(level)], key, level);
     if (tiles.empty()) break;  // and none on deeper levels
     hasher.Add(std::uint64_t{tiles.size()});
     for (const geo::TileRange& range : tiles) {
@@ -68,14 +69,14 @@ std::uint64_t ElevationModel::DeeperTilesHash(const geo::TileKey& key) const {
     }
   }
   const std::uint64_t hash = hasher.Hash().low | 1;
-  impl_->KeepHash(memo_key, hash);
+  model_.KeepHash(memo_key, hash);
   return hash;
 }
 
-std::span<const std::vector<geo::TileRange>> ElevationModel::AvailabilityToDepthOf(const geo::TileKey& key) const {
-  const std::span<const std::vector<geo::TileRange>> all = impl_->available;
+std::span<const std::vector<geo::TileRange>> TileEdits::AvailabilityToDepthOf(const geo::TileKey& key) const {
+  const std::span<const std::vector<geo::TileRange>> all = model_.available;
   std::size_t levels = all.size();
-  const auto least = static_cast<std::size_t>(max_source_level()) + 1;
+  const auto least = static_cast<std::size_t>(model_.info.max_source_level) + 1;
   const auto has_none = [&](std::size_t level) {
     return static_cast<int>(level) > key.level && std::ranges::none_of(all[level], [&](const geo::TileRange& range) {
              return !geo::IsEmpty(geo::Intersection(range, geo::TilesBelow(key, static_cast<int>(level))));

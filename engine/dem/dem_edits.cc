@@ -13,6 +13,7 @@
 #include "engine/crs/node_positions.h"
 #include "engine/dem/corner_edges.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/edits/edit_error_bound.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/read_edits.h"
@@ -318,52 +319,52 @@ HeightRange ElevationModel::Impl::RangeOfReplacement(const Edit& edit, const geo
   return replacements[edit.replacement]->impl_->UneditedRange(lattice, key);
 }
 
-MeshDemands ElevationModel::DemandsOf(const geo::TileKey& key) const {
+std::uint64_t ElevationModel::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
+
+MeshDemands TileEdits::DemandsOf(const geo::TileKey& key) const {
   TERRACE_CHECK(geo::IsValid(key));
-  if (impl_->edits == nullptr) return {};
-  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
+  if (model_.edits == nullptr) return {};
+  const geo::Lattice& lattice = model_.LatticeOf(key.level);
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells + 1, lattice.cells + 1};
   // With the halo: both neighbours must find a line beside the edge that passes nodes of the edge.
-  const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
+  const auto which = model_.EditsAt(lattice, WindowOfTile(lattice, key));
   if (which.empty()) return {};
-  return impl_->edits->DemandsOf(lattice, window, which);
+  return model_.edits->DemandsOf(lattice, window, which);
 }
 
-MeshDemands ElevationModel::DemandsOf(int level, const NodeWindow& window) const {
-  if (impl_->edits == nullptr) return {};
-  const geo::Lattice& lattice = impl_->LatticeOf(level);
-  const auto which = impl_->EditsAt(lattice, {window.column - 1, window.row - 1, window.columns + 2, window.rows + 2});
+MeshDemands TileEdits::DemandsOf(int level, const NodeWindow& window) const {
+  if (model_.edits == nullptr) return {};
+  const geo::Lattice& lattice = model_.LatticeOf(level);
+  const auto which = model_.EditsAt(lattice, {window.column - 1, window.row - 1, window.columns + 2, window.rows + 2});
   if (which.empty()) return {};
-  return impl_->edits->DemandsOf(lattice, window, which);
+  return model_.edits->DemandsOf(lattice, window, which);
 }
 
-std::array<std::vector<MeshDemands>, 4> ElevationModel::DemandsBeyondCorners(const geo::TileKey& key) const {
+std::array<std::vector<MeshDemands>, 4> TileEdits::DemandsBeyondCorners(const geo::TileKey& key) const {
   std::array<std::vector<MeshDemands>, 4> demands;
-  if (impl_->edits == nullptr) return demands;
-  const auto edges = EdgesBeyondCorners(impl_->LatticeOf(key.level), key);
+  if (model_.edits == nullptr) return demands;
+  const auto edges = EdgesBeyondCorners(model_.LatticeOf(key.level), key);
   for (std::size_t corner = 0; corner < edges.size(); ++corner) {
     for (const NodeWindow& edge : edges[corner]) demands[corner].push_back(DemandsOf(key.level, edge));
   }
   return demands;
 }
 
-std::uint64_t ElevationModel::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
-
-std::uint64_t ElevationModel::EditsHash(const geo::TileKey& key) const {
-  if (impl_->edits == nullptr || !geo::IsValid(key) || key.level > geo::kMaxLevel) return 0;
-  return impl_->ComputeEditsHash(key);
+std::uint64_t TileEdits::Hash(const geo::TileKey& key) const {
+  if (model_.edits == nullptr || !geo::IsValid(key) || key.level > geo::kMaxLevel) return 0;
+  return model_.ComputeEditsHash(key);
 }
 
-std::uint64_t ElevationModel::MercatorEditsHash(int depth, const NodeWindow& window) const {
-  if (impl_->edits == nullptr) return 0;
+std::uint64_t TileEdits::MercatorHash(int depth, const NodeWindow& window) const {
+  if (model_.edits == nullptr) return 0;
   const geo::MercatorGrid grid{depth};
-  if (!impl_->edits->Any(BoxOf(grid, window))) return 0;
-  const Impl::HashKey memo_key = {depth, window.column, window.row, window.columns, window.rows};
-  if (const auto known = impl_->KnownHash(memo_key)) return *known;
+  if (!model_.edits->Any(BoxOf(grid, window))) return 0;
+  const ElevationModel::Impl::HashKey memo_key = {depth, window.column, window.row, window.columns, window.rows};
+  if (const auto known = model_.KnownHash(memo_key)) return *known;
   ContentHasher hasher;
-  for (const std::size_t number : impl_->EditsAt(grid, window)) hasher.Add(impl_->edits->edits()[number].hash);
+  for (const std::size_t number : model_.EditsAt(grid, window)) hasher.Add(model_.edits->edits()[number].hash);
   const std::uint64_t hash = hasher.Hash().low | 1;
-  impl_->KeepHash(memo_key, hash);
+  model_.KeepHash(memo_key, hash);
   return hash;
 }
 
@@ -444,10 +445,10 @@ std::uint64_t ElevationModel::Impl::ComputeEditsHash(const geo::TileKey& key) co
   return hash;
 }
 
-std::vector<EditOutline> ElevationModel::Edits() const {
+std::vector<EditOutline> TileEdits::Outlines() const {
   std::vector<EditOutline> outlines;
-  if (impl_->edits == nullptr) return outlines;
-  for (const Edit& edit : impl_->edits->edits()) {
+  if (model_.edits == nullptr) return outlines;
+  for (const Edit& edit : model_.edits->edits()) {
     EditOutline& outline = outlines.emplace_back();
     outline.op = NameOf(edit.op);
     outline.is_area = edit.is_area;

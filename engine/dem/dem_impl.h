@@ -26,7 +26,7 @@ struct PartReading {
   GridReading reading = {};
 };
 
-// What the heights of a raster grid depend on, for ElevationModel::ContentBelow.
+// What the heights of a raster grid depend on, for ContentBelow.
 struct GridContent {
   ContentHash grid;                  // its pixel grid, vertical datum and geoid
   std::vector<ContentHash> members;  // samples, positions and rules for voids, by member
@@ -129,7 +129,7 @@ class ElevationModel::Impl {
   HeightRange unedited_heights;  // `info.heights` without edits
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  // Level, column, row; then for MercatorEditsHash the window's columns and rows, for EditsHash 0, 0, for
+  // Level, column, row; then for TileEdits::MercatorHash the window's columns and rows, for Hash 0, 0, for
   // DeeperTilesHash -1, -1.
   using HashKey = std::array<std::int64_t, 5>;
   struct HashOfKey {

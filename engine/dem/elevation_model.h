@@ -7,7 +7,6 @@
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -15,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/common/content_hash.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/gdal/file_stamp.h"
@@ -24,6 +22,8 @@
 #include "engine/sight/sight_ray.h"
 
 namespace terrace::dem {
+
+struct ContentHash;
 
 class ElevationModel {
  public:
@@ -114,26 +114,6 @@ class ElevationModel {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool has_geoid() const;
 
-  // Edits (docs/edits.md). Without edits all of these except AvailabilityToDepthOf are 0 or empty.
-  //
-  // The requirements of edits for the mesh of a tile. Precondition: a valid key.
-  MeshDemands DemandsOf(const geo::TileKey& key) const;
-  // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
-  MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // Edges of other tiles also end at this tile's corners. Returns, for each corner (south-west, south-east, north-east,
-  // north-west), one MeshDemands per such edge: the requirements at its nodes, without its two end nodes.
-  std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
-  // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
-  // pixels as ReadMercator has them. Cheap after the first call for a tile.
-  std::uint64_t EditsHash(const geo::TileKey& key) const;
-  std::uint64_t MercatorEditsHash(int depth, const NodeWindow& window) const;
-  // A hash of all available tiles below a tile if edits added some of them; 0: they added none.
-  std::uint64_t DeeperTilesHash(const geo::TileKey& key) const;
-  // The levels of Availability() from 0 to the deepest one that has a tile below `key`, or to max_source_level() if
-  // that is deeper.
-  std::span<const std::vector<geo::TileRange>> AvailabilityToDepthOf(const geo::TileKey& key) const;
-  std::vector<EditOutline> Edits() const;
-
   // Samples read since Open for nodes and pixels, not for points and rays, by all threads. For metrics.
   SampleCounts CountSamples() const;
   // Blocks that the process keeps now, of all models. For metrics.
@@ -145,13 +125,6 @@ class ElevationModel {
   // The same without edits.
   std::uint64_t unedited_fingerprint() const;
 
-  // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
-  // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
-  // same bits for each of these tiles, and RangeBound the same ranges for them and their neighbours. On levels deeper
-  // than max_source_level() this holds for available tiles only. A change of a source near the tiles may change the
-  // hash although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
-  ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
-
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.
   bool has_lost_cache() const;
 
@@ -160,6 +133,8 @@ class ElevationModel {
 
  private:
   class Impl;
+  friend class TileEdits;                                                            // tile_edits.h
+  friend ContentHash ContentBelow(const ElevationModel&, const geo::TileKey&, int);  // content_below.h
   explicit ElevationModel(std::unique_ptr<Impl> impl);
   static Result<std::unique_ptr<ElevationModel>> OpenAs(std::vector<DemFile> files, const DemOptions& options,
                                                         bool only_cached);

@@ -18,6 +18,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/edits/edit.h"
+#include "engine/edits/edit_effects.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/lattice.h"
 

@@ -1,19 +1,11 @@
 // Hashes of the bytes of masks, images and PROJ grids. Elevation rasters are hashed together with their statistics.
 #pragma once
 
-#include <stop_token>
-#include <string>
-
 #include "engine/common/content_hash.h"
 #include "engine/core/result.h"
 #include "engine/gdal/file_stamp.h"
 
 namespace terrace::dem {
-
-struct FileContentOptions {
-  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
-  std::stop_token stop = {};
-};
 
 // Hashes all files in order, but not their paths, inodes and times. Files with a GDAL path, which may be remote, are
 // not read: StampedFiles::gdal_path_fingerprints is used instead. The hash of a file is cached as long as its stamp is

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,12 @@ struct FileStamp {
 
 // Returns the file's stamp; nullopt if `path` is not a regular file.
 std::optional<FileStamp> StampOf(const std::string& path);
+
+// How the bytes of files are hashed (file_content.h).
+struct FileContentOptions {
+  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
+  std::stop_token stop = {};
+};
 
 // Returns kChanged with the message that `path` is no longer the file that was opened.
 Error ChangedError(const std::string& path);

@@ -12,7 +12,6 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_content.h"
 #include "engine/gdal/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
@@ -46,8 +45,8 @@ class Imagery {
   // Opens an image in 8 or 16 bits per band, with a georeference: grey with or without alpha, a palette, bands that
   // state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path` is
   // resolved at each use. kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be
-  // opened, no georeference, bands that are not colours, or an image outside `around`. Other errors: those of HashFiles
-  // (file_content.h).
+  // opened, no georeference, bands that are not colours, or an image outside `around`. kChanged: a file was replaced
+  // meanwhile. kUnavailable: it cannot be read. kCancelled: stopped.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();

@@ -10,7 +10,6 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_content.h"
 #include "engine/gdal/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
@@ -22,7 +21,8 @@ class WaterRaster {
 
   // Opens band 1 of a georeferenced raster. `around`: the bounds of the dataset (DemInfo::bounds). `path` is resolved
   // at each use. kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no
-  // georeference, or a raster outside `around`. Other errors: those of HashFiles (file_content.h).
+  // georeference, or a raster outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it cannot be
+  // read. kCancelled: stopped.
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "engine/dem/tile_edits.h"
 #include "server/api/caching.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
@@ -67,7 +68,9 @@ DocumentAnswer DescribeEdits(const HandlerState& state, const RequestContext& co
   plan.key = "edits " + std::to_string(*index);
   plan.content_type = "application/geo+json";
   plan.cache_control = kRevalidate;
-  plan.write = [&dataset](const std::stop_token& stop) { return EditsGeoJson(dataset.model->Edits(), stop); };
+  plan.write = [&dataset](const std::stop_token& stop) {
+    return EditsGeoJson(dem::TileEdits(*dataset.model).Outlines(), stop);
+  };
   return plan;
 }
 

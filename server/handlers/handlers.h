@@ -16,6 +16,7 @@
 #include "config/config.h"
 #include "engine/core/result.h"
 #include "engine/dem/elevation_model.h"
+#include "engine/edits/edit_effects.h"
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
 #include "server/api/request_context.h"

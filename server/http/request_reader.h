@@ -28,7 +28,8 @@ class RequestReader {
  public:
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
-  // Returns nothing if the connection has ended, was idle for too long, or is closing and no request came in time.
+  // Returns nothing if the connection has ended, was idle for too long, or no request came within the grace of
+  // EndAfterNext.
   // `now`: the current time, or shortly before.
   using HeadOutcome = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<HeadOutcome> ReadHead(Request& request, Stream::Clock::time_point now);
@@ -39,9 +40,9 @@ class RequestReader {
 
   // Makes the next request the last one. It is waited for until `grace` has passed from now; a request that has begun
   // by then is read.
-  void Close(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
+  void EndAfterNext(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
   bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
-  bool closing() const { return closing_; }
+  bool ends_after_next() const { return ends_after_next_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 
   // Discards what was read, then reads and discards until the client ends its sending or `max_bytes` bytes have come.
@@ -62,7 +63,7 @@ class RequestReader {
   HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;
-  bool closing_ = false;
+  bool ends_after_next_ = false;
   Stream::Clock::time_point close_at_ = Stream::Clock::time_point::max();  // unless a request has begun
 };
 

@@ -106,13 +106,13 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   }
   void EvictHere() {
     hurried_ = true;
-    reader_.Close();
+    reader_.EndAfterNext();
     if (phase() == Phase::kServes) return;                    // a request has arrived meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
-  void DrainHere() { reader_.Close(context_->options.drain_grace); }
+  void DrainHere() { reader_.EndAfterNext(context_->options.drain_grace); }
   void AbortHere() {
-    reader_.Close();
+    reader_.EndAfterNext();
     stream_.Reset();
   }
 
@@ -242,9 +242,9 @@ asio::awaitable<bool> Session::GiveUp() {
     co_await RefuseUpload();
     co_return false;
   }
-  Response nobody;
-  nobody.status = kClientLeft;
-  Report(nobody, 0);
+  Response unsent;
+  unsent.status = kClientLeft;
+  Report(unsent, 0);
   stream_.Close();
   co_return false;
 }
@@ -434,7 +434,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   exchange_.request.body = RequestBody();  // released before the client reads the reply
   HeadOptions options;
   options.version = request.version;
-  options.keep_alive = request.keep_alive && !response.close && !reader_.closing();
+  options.keep_alive = request.keep_alive && !response.close && !reader_.ends_after_next();
   options.is_private = request.is_private;
   options.cors = &context_->cors;
   options.origin = request.fields->origin;
@@ -442,6 +442,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
+  // ClientLeft may have sent the first bytes of the reply, to test the connection.
   Skip(stream_.TakeBytesSentAhead(), left);
   // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);

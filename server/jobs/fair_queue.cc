@@ -66,24 +66,24 @@ void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
   if (length == kLong) ++long_waiting_;
 }
 
-bool FairQueue::HasNext(bool all_may_be_long) const {
-  return size_ > long_waiting_ || (size_ > 0 && MayRunLong(all_may_be_long));
+bool FairQueue::HasNext(bool ignores_long_limit) const {
+  return size_ > long_waiting_ || (size_ > 0 && MayRunLong(ignores_long_limit));
 }
 
 // Returns null if no job may run.
-PoolJobPtr* FairQueue::FirstOf(Client& client, bool all_may_be_long) const {
+PoolJobPtr* FairQueue::FirstOf(Client& client, bool ignores_long_limit) const {
   Waiting &shorter = client.waiting[kShort], &longer = client.waiting[kLong];
-  const bool may_long = !longer.empty() && MayRunLong(all_may_be_long);
+  const bool may_long = !longer.empty() && MayRunLong(ignores_long_limit);
   if (shorter.empty()) return may_long ? &longer.begin()->second : nullptr;
   if (!may_long || shorter.begin()->first <= longer.begin()->first) return &shorter.begin()->second;
   return &longer.begin()->second;
 }
 
-PoolJobPtr FairQueue::Take(JobClock::time_point now, bool all_may_be_long) {
+PoolJobPtr FairQueue::Take(JobClock::time_point now, bool ignores_long_limit) {
   Client* best = nullptr;
   double best_used = 0;
   for (auto& [number, client] : clients_) {
-    if (FirstOf(client, all_may_be_long) == nullptr) continue;
+    if (FirstOf(client, ignores_long_limit) == nullptr) continue;
     const double used = client.UsedAt(now);
     const bool is_first =
         best == nullptr || used < best_used || (used == best_used && client.last_turn < best->last_turn);
@@ -92,7 +92,7 @@ PoolJobPtr FairQueue::Take(JobClock::time_point now, bool all_may_be_long) {
     best_used = used;
   }
   if (best == nullptr) return nullptr;
-  const PoolJobPtr job = *FirstOf(*best, all_may_be_long);
+  const PoolJobPtr job = *FirstOf(*best, ignores_long_limit);
   best->started.push_back(now);
   Erase(*best, job);
   best->last_turn = next_turn_++;

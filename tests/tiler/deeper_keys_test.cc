@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "engine/dem/tile_edits.h"
 #include "tests/engine/dem/edits_fixture.h"
 #include "tiler/tile_pipeline.h"
 
@@ -30,18 +31,19 @@ TEST(DeeperKeys, AreOfTheEditsAndOfTheTilesBelow) {
   const auto offset = open(inside), precise = open(beside), both = open(inside + "," + beside);
   ASSERT_TRUE(offset && precise && both);
   ASSERT_EQ(both->max_source_level(), kKey.level);
-  ASSERT_NE(offset->EditsHash(kKey), 0u);
-  ASSERT_EQ(both->EditsHash(kKey), offset->EditsHash(kKey));
-  ASSERT_EQ(precise->EditsHash(kKey), 0u);
-  ASSERT_NE(both->AvailabilityToDepthOf(kKey).size(), offset->AvailabilityToDepthOf(kKey).size());
+  ASSERT_NE(dem::TileEdits(*offset).Hash(kKey), 0u);
+  ASSERT_EQ(dem::TileEdits(*both).Hash(kKey), dem::TileEdits(*offset).Hash(kKey));
+  ASSERT_EQ(dem::TileEdits(*precise).Hash(kKey), 0u);
+  ASSERT_NE(dem::TileEdits(*both).AvailabilityToDepthOf(kKey).size(),
+            dem::TileEdits(*offset).AvailabilityToDepthOf(kKey).size());
   TileRequest request;
   request.key = kKey;
   EXPECT_EQ(TileEditsHash(*offset, request), TileEditsHash(*both, request));
   EXPECT_EQ(TileEditsHash(*precise, request), 0u);
   request.extensions.metadata = true;
-  EXPECT_EQ(TileEditsHash(*offset, request), offset->EditsHash(kKey));
+  EXPECT_EQ(TileEditsHash(*offset, request), dem::TileEdits(*offset).Hash(kKey));
   EXPECT_NE(TileEditsHash(*both, request), TileEditsHash(*offset, request));
-  EXPECT_EQ(TileEditsHash(*precise, request), precise->DeeperTilesHash(kKey));
+  EXPECT_EQ(TileEditsHash(*precise, request), dem::TileEdits(*precise).DeeperTilesHash(kKey));
   EXPECT_NE(TileEditsHash(*both, request), TileEditsHash(*precise, request));
 }
 

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -161,7 +162,7 @@ TEST_F(Edits, KeepThePrecisionAtEverySample) {
             const FetchedTile tile = FetchTile(pipeline, RequestFor(key, step));
             const auto heights = ModelOf(pipeline).Read(key);
             ASSERT_TRUE(heights.has_value());
-            const dem::MeshDemands demands = ModelOf(pipeline).DemandsOf(key);
+            const dem::MeshDemands demands = dem::TileEdits(ModelOf(pipeline)).DemandsOf(key);
             const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
             const double error_m = geo::LadderError(level, step);
             for (std::size_t k = 0; k < demands.weights.size(); ++k) {
@@ -194,7 +195,7 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
       const FetchedTile tile = FetchTile(pipeline, RequestFor(key, 0));
       const auto heights = ModelOf(pipeline).Read(key);
       ASSERT_TRUE(heights.has_value());
-      const dem::MeshDemands demands = ModelOf(pipeline).DemandsOf(key);
+      const dem::MeshDemands demands = dem::TileEdits(ModelOf(pipeline)).DemandsOf(key);
       const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
       const int cells = heights->lattice.cells;
       for (std::size_t k = 0; k < demands.caps.size(); ++k) {
@@ -228,7 +229,7 @@ void ExpectEdgesAndPrecision(const TilePipeline& pipeline, int level, int step) 
     const geo::TileKey key{level, at.first, at.second};
     const auto heights = model.Read(key);
     ASSERT_TRUE(heights.has_value());
-    const dem::MeshDemands demands = model.DemandsOf(key);
+    const dem::MeshDemands demands = dem::TileEdits(model).DemandsOf(key);
     const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
     for (std::size_t k = 0; k < demands.caps.size(); ++k) {
       const auto allowed = static_cast<double>(demands.caps[k]);
@@ -262,7 +263,7 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   }
   // Elsewhere the deepest tiles stay as they are, whatever a request asks for.
   const geo::TileKey beside = TileAt(finest, -4, 3);
-  ASSERT_EQ(model.EditsHash(beside), 0u);
+  ASSERT_EQ(dem::TileEdits(model).Hash(beside), 0u);
   for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
     for (const bool metadata : {false, true}) {
       for (const int step : kSteps) {
@@ -293,7 +294,7 @@ TEST_F(Edits, LeaveTheBytesOfTilesThatTheyDoNotTouch) {
             request.format = format;
             const auto a = plain.Build(request, {}), b = edited.Build(request, {});
             ASSERT_TRUE(a.has_value() && b.has_value());
-            const bool is_touched = ModelOf(edited).EditsHash(key) != 0;
+            const bool is_touched = dem::TileEdits(ModelOf(edited)).Hash(key) != 0;
             if (is_touched) {
               ++touched;
               differ += a->bytes != b->bytes ? 1 : 0;

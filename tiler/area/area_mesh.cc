@@ -12,6 +12,7 @@
 #include "engine/core/check.h"
 #include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
@@ -278,7 +279,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPl
   const AreaSurface surface(model.LatticeOf(plan.level), plan.window);
   tin::GreedyOptions options;
   if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
-  dem::MeshDemands demands = model.DemandsOf(plan.level, plan.window);
+  dem::MeshDemands demands = dem::TileEdits(model).DemandsOf(plan.level, plan.window);
   options.limits = LimitsOf(demands);
   const tin::SampleLimits limits = options.limits;
   tin::GreedyTriangulation greedy(*field, std::move(options));

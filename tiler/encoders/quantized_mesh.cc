@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "engine/core/elapsed_time.h"
+#include "engine/dem/tile_edits.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/tile_metadata.h"
 #include "proto/mesh/tile_normals.h"
@@ -53,8 +54,8 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
     tile.water_mask = *std::move(mask);
   }
   if (extensions.metadata) {
-    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.model->AvailabilityToDepthOf(request.key),
-                                              dataset.metadata_availability);
+    tile.metadata = proto::EncodeTileMetadata(
+        request.key, dem::TileEdits(*dataset.model).AvailabilityToDepthOf(request.key), dataset.metadata_availability);
   }
   return extensions;
 }

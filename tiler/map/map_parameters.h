@@ -16,7 +16,8 @@ struct MapParameters {
   std::uint8_t altitude_deg = 45;           // of the light above the horizon, 0 .. 90
   std::uint16_t z_factor_hundredths = 100;  // heights are multiplied by it, 1 .. 10000
   SlopeStyle slope_style = SlopeStyle::kColors;
-  // Of contours: not 0 in their requests. Multiplied by 5 until the tile has few enough points.
+  // Between contours; requests for contours must set it. The encoder multiplies it by 5 until the tile has few enough
+  // points.
   std::uint32_t interval_cm = 0;
 
   friend bool operator==(const MapParameters&, const MapParameters&) = default;

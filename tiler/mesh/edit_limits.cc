@@ -6,18 +6,19 @@
 #include <cstddef>
 #include <utility>
 
+#include "engine/dem/tile_edits.h"
 #include "engine/tin/scan/triangle_rows.h"
-#include "tiler/mesh/bound_minus_rounding.h"
+#include "tiler/mesh/bound_at_samples.h"
 
 namespace terrace::tiler {
 
 tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key) {
-  return LimitsOf(model.DemandsOf(key));
+  return LimitsOf(dem::TileEdits(model).DemandsOf(key));
 }
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
-  for (float& cap : demands.caps) cap = static_cast<float>(BoundMinusRounding(static_cast<double>(cap)));
+  for (float& cap : demands.caps) cap = static_cast<float>(BoundAtSamples(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
   limits.caps = std::move(demands.caps);
   limits.forced = std::move(demands.forced);
@@ -54,9 +55,9 @@ void AddOwnErrors(const tin::SampleLimits& limits, int cells, double error_m, pr
 proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::TileKey& key,
                                const tin::SampleLimits& limits, double error_m) {
   proto::EdgeErrors errors(error_m);
-  if (model.EditsHash(key) == 0) return errors;
+  if (dem::TileEdits(model).Hash(key) == 0) return errors;
   AddOwnErrors(limits, model.LatticeOf(key.level).cells, error_m, errors);
-  const auto beyond = model.DemandsBeyondCorners(key);
+  const auto beyond = dem::TileEdits(model).DemandsBeyondCorners(key);
   for (std::size_t corner = 0; corner < 4; ++corner) {
     // Side k runs from corner k to corner k + 1.
     double& least_m = errors.corner[corner];
@@ -74,7 +75,7 @@ proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::Tile
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::ElevationModel& model, const geo::TileKey& key,
                                            const tin::TinMesh& mesh) {
-  return TrianglesInHoles(model.DemandsOf(key), model.LatticeOf(key.level).cells + 1, mesh);
+  return TrianglesInHoles(dem::TileEdits(model).DemandsOf(key), model.LatticeOf(key.level).cells + 1, mesh);
 }
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/dem/elevation_model.h"
+#include "engine/edits/edit_effects.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/sample_limits.h"

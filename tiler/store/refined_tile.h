@@ -28,7 +28,7 @@ using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
 struct RefinedTileKey {
   std::uint64_t generation = 0;  // Dataset::cache_generation: identifies the dataset
   geo::TileKey key;
-  std::uint64_t edits = 0;  // ElevationModel::EditsHash
+  std::uint64_t edits = 0;  // dem::TileEdits::Hash
 
   friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;
 };

@@ -23,7 +23,7 @@ namespace terrace::tiler {
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
-  std::uint64_t generation = 0;  // Dataset::cache_generation of TilePipeline::datasets()
+  std::uint64_t generation = 0;  // Dataset::cache_generation(), with the dataset from TilePipeline::datasets()
   // TileEditsHash (tiler/dataset.h); 0 for a dataset that has only baked tiles. So tiles that an edit does not touch
   // stay valid when it changes.
   std::uint64_t edits = 0;
@@ -85,8 +85,8 @@ class Store : public StoreBase {
   // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
 
-  // Called by TileTiers, not by RefinementCache: no Insert follows a Find that found nothing, because the build failed
-  // or was cancelled.
+  // Says that no Insert will follow the Find of this key that found nothing: the build failed or was cancelled.
+  // TileTiers calls it, RefinementCache does not.
   virtual void GiveUp(const Key&) {}
 };
 

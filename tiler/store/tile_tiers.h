@@ -41,12 +41,13 @@ class TileTiers {
   // `build` is called if no tier has the tile. Its error is returned and not kept; its exceptions pass. Blocks.
   Result<TilePtr> FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build);
 
-  // Erases these tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors: those of
-  // the stores. If one fails, the others are erased nevertheless.
+  // How many tiles were erased.
   struct Erased {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // by the store's name
   };
+  // Erases the selected tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors:
+  // those of the stores. If one fails, the others are erased nevertheless.
   Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
 
   // The sum of the durations of look-ups in each store.

@@ -13,7 +13,7 @@ namespace terrace::tiler {
 // sources, the floor in heights of a drawn surface.
 struct PointHeights {
   std::vector<float> heights;
-  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty: of a drawn surface
+  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty for a drawn surface
   std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
   // Of drawn surfaces: the tiles that were read, and the index of each point's tile. Empty: heights of the sources.
   std::vector<geo::TileKey> tiles = {};

@@ -1,4 +1,4 @@
-// An encoded tile. Immutable, and shared by the cache and all responses that send it.
+// An encoded tile, or the file of an area mesh. Immutable, and shared by the cache and all responses that send it.
 #pragma once
 
 #include <chrono>

@@ -46,8 +46,8 @@ struct TileRequest {
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
-  // Pixels along an edge: kHeightPng, and map layers except kContours. Their depth
-  // (ElevationModel::ReadMercator) is the level with 256 pixels, and the level + 1 with 512.
+  // Pixels along an edge: kHeightPng, and map layers except kContours. The depth of
+  // these pixels (ElevationModel::ReadMercator) is key.level if there are 256, and key.level + 1 if there are 512.
   int side_px = kSidesPx[0];
   MapParameters map;  // IsMapLayer(format)
 

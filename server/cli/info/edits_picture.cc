@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/color.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/ellipsoid.h"
 #include "proto/documents/height_png.h"
 
@@ -85,7 +86,7 @@ class Picture {
 }  // namespace
 
 Result<std::string> DrawEdits(const dem::ElevationModel& model) {
-  const std::vector<dem::EditOutline> edits = model.Edits();
+  const std::vector<dem::EditOutline> edits = dem::TileEdits(model).Outlines();
   const Frame frame = FrameOf(edits);
   std::vector<dem::GeoPosition> positions;
   for (int y = 0; y <= kSide; ++y) {
@@ -123,7 +124,7 @@ Result<std::string> DrawEdits(const dem::ElevationModel& model) {
 
 std::string CountEdits(const dem::ElevationModel& model) {
   std::map<std::string, std::size_t> counts;
-  for (const dem::EditOutline& edit : model.Edits()) ++counts[edit.op];
+  for (const dem::EditOutline& edit : dem::TileEdits(model).Outlines()) ++counts[edit.op];
   std::string text;
   for (const auto& [op, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, op);
   if (text.empty()) return "none: no feature has \"terrain\" in its properties";

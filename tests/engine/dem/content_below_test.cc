@@ -1,5 +1,7 @@
-// ElevationModel::ContentBelow: where it is equal, tiles are. A bake that is brought up to date keeps the others'
+// ContentBelow: where it is equal, tiles are. A bake that is brought up to date keeps the others'
 // files.
+#include "engine/dem/content_below.h"
+
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -107,7 +109,7 @@ std::vector<geo::TileKey> Tops() {
 
 Below ReadBelow(const ElevationModel& model, const geo::TileKey& top) {
   const int deepest = top.level + 2;
-  Below below{model.ContentBelow(top, deepest), {}, {}};
+  Below below{ContentBelow(model, top, deepest), {}, {}};
   for (int level = top.level; level <= deepest; level += 2) {
     const int down = level - top.level;
     const std::int64_t last = (std::int64_t{1} << down) - 1;
@@ -219,9 +221,9 @@ TEST(ContentBelow, OptionsAndLowestLevelCount) {
   const auto source = landscape.Open();
   ASSERT_TRUE(source);
   const geo::TileKey top = Tops()[5];
-  const ContentHash hash = source->ContentBelow(top, 10);
-  EXPECT_EQ(hash, source->ContentBelow(top, 10));
-  EXPECT_NE(hash, source->ContentBelow(top, 9));
+  const ContentHash hash = ContentBelow(*source, top, 10);
+  EXPECT_EQ(hash, ContentBelow(*source, top, 10));
+  EXPECT_NE(hash, ContentBelow(*source, top, 9));
   for (const auto& change : std::vector<std::function<void(DemOptions&)>>{
            [](DemOptions& o) { o.floor = 1; }, [](DemOptions& o) { o.feather = 100; },
            [](DemOptions& o) { o.voids = HoleFill::kFloor; }, [](DemOptions& o) { o.max_void_gap = 5; },
@@ -230,7 +232,7 @@ TEST(ContentBelow, OptionsAndLowestLevelCount) {
     change(options);
     const auto other = Landscape(options).Open();
     ASSERT_TRUE(other);
-    EXPECT_NE(other->ContentBelow(top, 10), hash);
+    EXPECT_NE(ContentBelow(*other, top, 10), hash);
   }
 }
 

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/dem/content_below.h"
 #include "engine/dem/elevation_model.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "tests/engine/dem/edits_fixture.h"
@@ -67,11 +69,11 @@ TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
   const geo::TileKey here{finest, static_cast<std::int64_t>((10.355 + 180) / 180 * double(geo::TileRows(finest))),
                           static_cast<std::int64_t>((50.351 + 90) / 180 * double(geo::TileRows(finest)))};
   const geo::TileKey there{finest, here.x - 4, here.y};
-  EXPECT_NE(edited->DeeperTilesHash(here), 0u);
-  EXPECT_EQ(edited->DeeperTilesHash(there), 0u);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityToDepthOf(here).size()), edited->max_level() + 1);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityToDepthOf(there).size()), finest + 1);
-  EXPECT_EQ(plain->ContentBelow(there, finest), edited->ContentBelow(there, finest));
+  EXPECT_NE(TileEdits(*edited).DeeperTilesHash(here), 0u);
+  EXPECT_EQ(TileEdits(*edited).DeeperTilesHash(there), 0u);
+  EXPECT_EQ(static_cast<int>(TileEdits(*edited).AvailabilityToDepthOf(here).size()), edited->max_level() + 1);
+  EXPECT_EQ(static_cast<int>(TileEdits(*edited).AvailabilityToDepthOf(there).size()), finest + 1);
+  EXPECT_EQ(ContentBelow(*plain, there, finest), ContentBelow(*edited, there, finest));
 }
 
 // Skirts provide for neighbours of one level of difference, also beside the data.
@@ -121,10 +123,10 @@ TEST_F(TerrainEdits, HashTheTilesBelowATile) {
               is_deeper |= !geo::IsEmpty(common) && !plain->IsAvailable({below, common.start_x, common.start_y});
             }
           }
-          const std::uint64_t edits = edited->EditsHash(key), deeper = edited->DeeperTilesHash(key);
+          const std::uint64_t edits = TileEdits(*edited).Hash(key), deeper = TileEdits(*edited).DeeperTilesHash(key);
           EXPECT_EQ(deeper != 0, is_deeper) << geo::ToString(key);
-          EXPECT_EQ(edited->DeeperTilesHash(key), deeper);
-          EXPECT_EQ(edited->EditsHash(key), edits);
+          EXPECT_EQ(TileEdits(*edited).DeeperTilesHash(key), deeper);
+          EXPECT_EQ(TileEdits(*edited).Hash(key), edits);
           if (deeper != 0) {
             EXPECT_NE(deeper, edits);
           }
@@ -184,7 +186,7 @@ TEST_F(TerrainEdits, AreInTheContentOfTheDeeperTilesThatTheyTouch) {
     EXPECT_GT(source->max_level(), kFinest + 1);
     EXPECT_EQ(source->RangeBound(coarse).min, plain->RangeBound(coarse).min);
     EXPECT_EQ(source->RangeBound(fine).min < plain->RangeBound(fine).min, is_edited);
-    return source->ContentBelow(kTop, source->max_level());
+    return ContentBelow(*source, kTop, source->max_level());
   };
   const std::string inside = precise(west + 2 * kTile), at_rim = precise(west + 0.2 * kTile);
   EXPECT_EQ(hash(inside, false), hash(inside + "," + beside, true));

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "engine/crs/geoid.h"
+#include "engine/dem/content_below.h"
 #include "engine/dem/elevation_model.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -317,9 +319,9 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
     return geo::TileKey{kLevel, static_cast<std::int64_t>((longitude + 180) * tiles),
                         static_cast<std::int64_t>((50.2 + 90) * tiles)};
   };
-  EXPECT_NE(carved->EditsHash(key(179.99)), 0u);
-  EXPECT_NE(carved->EditsHash(key(-179.99)), 0u);
-  for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(carved->EditsHash(key(far)), 0u) << far;
+  EXPECT_NE(TileEdits(*carved).Hash(key(179.99)), 0u);
+  EXPECT_NE(TileEdits(*carved).Hash(key(-179.99)), 0u);
+  for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(TileEdits(*carved).Hash(key(far)), 0u) << far;
   const int finest = carved->max_source_level();
   const auto row = static_cast<std::int64_t>((50.2 + 90) * std::ldexp(1, finest) / 180);
   const auto east = carved->Read({finest, 0, row}), west = carved->Read({finest, geo::TileColumns(finest) - 1, row});
@@ -331,7 +333,7 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
     low += east->At(0, y) == 50 ? 1 : 0;
   }
   EXPECT_GT(low, 1);
-  for (const EditOutline& outline : carved->Edits()) {
+  for (const EditOutline& outline : TileEdits(*carved).Outlines()) {
     ASSERT_EQ(outline.lines.size(), 2u);
     EXPECT_NEAR(outline.lines[0].front().longitude, 179.9, 1e-9);
     EXPECT_NEAR(outline.lines[0].back().longitude, 180, 1e-9);
@@ -407,9 +409,9 @@ TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
         const bool is_same =
-            plain->ContentBelow({level, x, y}, level + 2) == edited->ContentBelow({level, x, y}, level + 2);
+            ContentBelow(*plain, {level, x, y}, level + 2) == ContentBelow(*edited, {level, x, y}, level + 2);
         ++(is_same ? same : changed);
-        EXPECT_FALSE(is_same && edited->EditsHash({level, x, y}) != 0);
+        EXPECT_FALSE(is_same && TileEdits(*edited).Hash({level, x, y}) != 0);
       }
     }
   }
@@ -482,13 +484,13 @@ TEST_F(TerrainEdits, HaveAnotherHashIfTheMeanChanges) {
   ASSERT_NE(low, nullptr);
   const geo::TileKey in_the_east{12, static_cast<std::int64_t>((10.24 + 180) / 180 * 4096),
                                  static_cast<std::int64_t>((50.2 + 90) / 180 * 4096)};
-  const std::uint64_t before = low->EditsHash(in_the_east);
-  const ContentHash content = low->ContentBelow(in_the_east, 12);
+  const std::uint64_t before = TileEdits(*low).Hash(in_the_east);
+  const ContentHash content = ContentBelow(*low, in_the_east, 12);
   const auto high = open(130);
   ASSERT_NE(high, nullptr);
   EXPECT_NE(before, 0u);
-  EXPECT_NE(high->EditsHash(in_the_east), before);
-  EXPECT_FALSE(high->ContentBelow(in_the_east, 12) == content);
+  EXPECT_NE(TileEdits(*high).Hash(in_the_east), before);
+  EXPECT_FALSE(ContentBelow(*high, in_the_east, 12) == content);
   EXPECT_NE(high->fingerprint(), low->fingerprint());
 }
 

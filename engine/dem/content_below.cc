@@ -1,4 +1,5 @@
-// The hash of all that the tiles of a subtree depend on.
+#include "engine/dem/content_below.h"
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -49,19 +50,20 @@ bool HasPrecisionAround(const EditSet& edits, const geo::Lattice& lattice, const
 
 }  // namespace
 
-ContentHash ElevationModel::ContentBelow(const geo::TileKey& top, int deepest) const {
+ContentHash ContentBelow(const ElevationModel& model, const geo::TileKey& top, int deepest) {
+  const ElevationModel::Impl& impl = *model.impl_;
   TERRACE_CHECK(geo::IsValid(top) && top.level <= deepest && deepest <= geo::kMaxLevel);
   ContentHasher hasher;
-  hasher.Add(impl_->floor);
-  hasher.Add(max_source_level());
-  for (int level = top.level; level <= deepest; ++level) hasher.Add(impl_->LatticeOf(level).cells);
-  for (const std::size_t i : impl_->GridsNear(top)) {
-    const RasterGrid& grid = impl_->grids[i];
-    hasher.Add(impl_->contents[i].grid);
-    const std::vector<std::size_t> members = grid.MembersBelow(top, impl_->lattices, deepest);
+  hasher.Add(impl.floor);
+  hasher.Add(model.max_source_level());
+  for (int level = top.level; level <= deepest; ++level) hasher.Add(impl.LatticeOf(level).cells);
+  for (const std::size_t i : impl.GridsNear(top)) {
+    const RasterGrid& grid = impl.grids[i];
+    hasher.Add(impl.contents[i].grid);
+    const std::vector<std::size_t> members = grid.MembersBelow(top, impl.lattices, deepest);
     hasher.Add(std::uint64_t{members.size()});
     for (const std::size_t member : members) {
-      hasher.Add(impl_->contents[i].members[member]);
+      hasher.Add(impl.contents[i].members[member]);
       hasher.Add(grid.members()[member].column);
       hasher.Add(grid.members()[member].row);
       // A void may be a hole because of rasters far away.
@@ -70,9 +72,9 @@ ContentHash ElevationModel::ContentBelow(const geo::TileKey& top, int deepest) c
     }
   }
   const std::vector<std::size_t> own =
-      impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top));
-  for (const std::size_t edit : own) hasher.Add(impl_->edits->edits()[edit].hash);
-  if (impl_->edits != nullptr && HasPrecisionAround(*impl_->edits, impl_->LatticeOf(top.level), top)) {
+      impl.EditsAt(impl.LatticeOf(top.level), WindowOfTile(impl.LatticeOf(top.level), top));
+  for (const std::size_t edit : own) hasher.Add(impl.edits->edits()[edit].hash);
+  if (impl.edits != nullptr && HasPrecisionAround(*impl.edits, impl.LatticeOf(top.level), top)) {
     // Corners on the rim have steps that also depend on edges outside.
     std::set<std::size_t> beyond;
     for (int level = top.level; level <= deepest; ++level) {
@@ -80,17 +82,17 @@ ContentHash ElevationModel::ContentBelow(const geo::TileKey& top, int deepest) c
       const std::int64_t side = std::int64_t{1} << down, last = side - 1;
       for (std::int64_t at = 0; at < side; ++at) {
         for (const auto& [dx, dy] : {std::pair{at, std::int64_t{0}}, {at, last}, {std::int64_t{0}, at}, {last, at}}) {
-          impl_->AddPrecisionBeyondCorners({level, (top.x << down) + dx, (top.y << down) + dy}, beyond);
+          impl.AddPrecisionBeyondCorners({level, (top.x << down) + dx, (top.y << down) + dy}, beyond);
         }
       }
     }
     for (const std::size_t edit : own) beyond.erase(edit);
-    for (const std::size_t edit : beyond) hasher.Add(impl_->edits->edits()[edit].hash);
+    for (const std::size_t edit : beyond) hasher.Add(impl.edits->edits()[edit].hash);
   }
   // The floor in the datum of a source (ReadInSourceDatum) comes from the last raster grid with a geoid.
-  for (std::size_t i = impl_->grids.size(); i-- > 0 && impl_->floor_undulations != nullptr;) {
-    if (impl_->grids[i].vertical().geoid == nullptr) continue;
-    hasher.Add(impl_->contents[i].grid);
+  for (std::size_t i = impl.grids.size(); i-- > 0 && impl.floor_undulations != nullptr;) {
+    if (impl.grids[i].vertical().geoid == nullptr) continue;
+    hasher.Add(impl.contents[i].grid);
     break;
   }
   // Edges depend on the ranges of the tiles on both sides. Ranges are hashed instead of the samples that they come
@@ -105,7 +107,7 @@ ContentHash ElevationModel::ContentBelow(const geo::TileKey& top, int deepest) c
     const int down = level - top.level;
     const std::int64_t side = std::int64_t{1} << down;
     const geo::TileKey first{level, top.x << down, top.y << down};
-    if (level > max_source_level()) {
+    if (level > model.max_source_level()) {
       for (const auto& [dx, dy] : RimOf(Available(level), first, side)) {
         hasher.Add(dx);
         hasher.Add(dy);
