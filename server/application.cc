@@ -258,9 +258,9 @@ asio::awaitable<bool> TerrainApplication::FirstCatalog(Clock::time_point give_up
 }
 
 // Returns false if none comes in time, if the dataset has a lasting problem, or if the server stops.
-asio::awaitable<bool> TerrainApplication::NextCatalog(HandlerStatePtr now, std::string dataset,
+asio::awaitable<bool> TerrainApplication::NextCatalog(HandlerStatePtr used, std::string dataset,
                                                       Clock::time_point give_up) const {
-  while (Current() == now) {
+  while (Current() == used) {
     if (draining() || HasLastingProblem(dataset) || Clock::now() >= give_up) co_return false;
     co_await Pause();
   }

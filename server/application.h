@@ -38,7 +38,7 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  // Returns the text of the problem kCacheProblem, "" if there is none. An empty function: there is never one.
+  // Returns why the folder of the statistics cache cannot be used; "" if it can. An empty function: it always can.
   std::function<std::string()> cache_problem;
   std::function<double(const std::string&)> progress_of;  // of a pending dataset, 0 to 1; may be empty
 };
@@ -78,7 +78,7 @@ class TerrainApplication final : public Application, public ServerStatus {
   bool HasLastingProblem(const std::string& dataset) const;
 
   asio::awaitable<bool> FirstCatalog(JobClock::time_point give_up) const;
-  asio::awaitable<bool> NextCatalog(HandlerStatePtr now, std::string dataset, JobClock::time_point give_up) const;
+  asio::awaitable<bool> NextCatalog(HandlerStatePtr used, std::string dataset, JobClock::time_point give_up) const;
 
   const ApplicationParts parts_;
   mutable std::mutex mutex_;

@@ -76,7 +76,9 @@ bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
   return true;
 }
 
-// The following functions are RouteRow::read. Of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on.
+// The following functions are values of RouteRow::read.
+
+// For tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on.
 bool ReadTile(const Segments& segments, Route& route) {
   std::string_view last = segments[3];
   route.format = TakeFormat(last);
@@ -87,7 +89,7 @@ bool ReadTile(const Segments& segments, Route& route) {
   return true;
 }
 
-// Of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
+// For tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
 template <std::size_t kAt>
 bool ReadTileInFolder(const Segments& segments, Route& route) {
   std::string_view last = segments[kAt + 2];
@@ -105,7 +107,7 @@ bool ReadMapLayer(const Segments& segments, Route& route) {
   return route.format != nullptr;
 }
 
-// Of implicit tiles: /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb, counted from the root.
+// For implicit tiles: /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb, counted from the root.
 bool ReadImplicitTile(const Segments& segments, Route& route) {
   std::string_view last = segments[5];
   route.format = TakeFormat(last);

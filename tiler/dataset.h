@@ -26,7 +26,7 @@ struct WaterOptions {
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };
 
-// The image of textures of GLB tiles and of map tiles. `texture` and `side` are of GLB tiles alone.
+// The image that textures of GLB tiles and image tiles for maps show. `texture` and `side` are for GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
   // The default for TileRequest::texture: bakes use it, and the server if a client names no texture. TilePipeline reads
@@ -60,9 +60,9 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
   // Identifies the dataset and its contents in caches: GenerationOf with ElevationModel::fingerprint. 0: TilePipeline
-  // sets it to the dataset's position, counted from 1, in its datasets(). Positions are not unique across pipelines:
-  // then no other pipeline may use the same RefinementCache, TileTiers or TileStore, neither at the same time nor
-  // later.
+  // sets it to the dataset's position, counted from 1, in its datasets(). Other pipelines use
+  // the same numbers: a dataset left at 0 must not share a RefinementCache, TileTiers or TileStore with another
+  // pipeline, neither at the same time nor later.
   std::uint64_t generation = 0;
   // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
   // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,
@@ -70,7 +70,7 @@ struct Dataset {
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`
-  std::uint64_t options_hash = 0;  // GenerationOf with 0; bakes use it
+  std::uint64_t options_hash = 0;  // GenerationOf(dataset, /*heights=*/0), for bakes
 };
 
 // A hash of three things: `heights` (a fingerprint of the model), all options of the dataset that change bytes, and the

@@ -69,7 +69,7 @@ const std::vector<std::vector<geo::TileRange>>& AvailableIn(const Dataset& datas
 
 int DeepestOf(const Dataset& dataset) { return static_cast<int>(AvailableIn(dataset).size()) - 1; }
 
-HasTile TilesOf(const Dataset& dataset) {
+HasTile AvailabilityOf(const Dataset& dataset) {
   return [&available = AvailableIn(dataset)](const geo::TileKey& key) { return geo::IsAvailable(available, key); };
 }
 
@@ -108,7 +108,8 @@ Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& datas
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = MicrosecondsSince(start);
-  // One with too many vertices has not reached the error. Another build may have stored a longer one meanwhile.
+  // Not kept: a refinement with too many vertices, because it has not reached the error; and one that is no better than
+  // what another build has stored meanwhile.
   const RefinedTilePtr other = refinements.FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements.Insert(cache_key, refined);
@@ -238,16 +239,16 @@ Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const 
                                                    std::stop_token stop) const {
   const Result<const Dataset*> found = Find(dataset);
   if (!found) return tl::unexpected(found.error());
-  const Dataset& of = **found;
-  if (const Result<void> has = CheckHasSurface(of, surface); !has) return tl::unexpected(has.error());
-  const Result<int> level = LevelOf(surface, DeepestOf(of), of.error_fraction);
+  const Dataset& known = **found;
+  if (const Result<void> has = CheckHasSurface(known, surface); !has) return tl::unexpected(has.error());
+  const Result<int> level = LevelOf(surface, DeepestOf(known), known.error_fraction);
   if (!level) return tl::unexpected(level.error());
   std::vector<dem::GeoPosition> wrapped(points.begin(), points.end());
   for (dem::GeoPosition& point : wrapped) {
     if (std::abs(point.longitude) > 180) point.longitude = std::remainder(point.longitude, 360);
   }
-  return tiler::ReadDrawnPoints(TilesOf(of), *level, wrapped, normals,
-                                MeshFinder(*drawn_, *refinements_, of, surface, stop), stop);
+  return tiler::ReadDrawnPoints(AvailabilityOf(known), *level, wrapped, normals,
+                                MeshFinder(*drawn_, *refinements_, known, surface, stop), stop);
 }
 
 Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
@@ -257,21 +258,21 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
                                                               std::stop_token stop) const {
   const Result<const Dataset*> found = Find(dataset);
   if (!found) return tl::unexpected(found.error());
-  const Dataset& of = **found;
-  if (!of.model && !surface) return NoSources();
-  if (of.model) {
-    if (const Result<void> bounded = CheckSamplesAlong(*of.model, rays); !bounded)
+  const Dataset& known = **found;
+  if (!known.model && !surface) return NoSources();
+  if (known.model) {
+    if (const Result<void> bounded = CheckSamplesAlong(*known.model, rays); !bounded)
       return tl::unexpected(bounded.error());
-    if (!surface) return of.model->LookAlong(rays, options, std::move(stop));
+    if (!surface) return known.model->LookAlong(rays, options, std::move(stop));
   }
-  if (const Result<void> has = CheckHasSurface(of, *surface); !has) return tl::unexpected(has.error());
-  const Result<int> level = LevelOf(*surface, DeepestOf(of), of.error_fraction);
+  if (const Result<void> has = CheckHasSurface(known, *surface); !has) return tl::unexpected(has.error());
+  const Result<int> level = LevelOf(*surface, DeepestOf(known), known.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  if (!of.model) {
+  if (!known.model) {
     if (const Result<void> bounded = CheckSamplesAlong(*level, rays); !bounded) return tl::unexpected(bounded.error());
   }
-  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshFinder(*drawn_, *refinements_, of, *surface, stop),
-                        stop);
+  return LookAlongDrawn(AvailabilityOf(known), *level, rays, options,
+                        MeshFinder(*drawn_, *refinements_, known, *surface, stop), stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {

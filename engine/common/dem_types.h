@@ -36,13 +36,13 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. Heights that an edit sets are stated in a datum too: reads in kOrthometric or kSource
-// give them unchanged if the edit's datum is also that of all sources within its reach and, for kSource, of the floor.
-// Otherwise they are converted to the ellipsoid and back, which may change them by millimetres.
+// The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
+// convert them to the ellipsoid and back, which may change them by millimetres; they stay unchanged if all sources
+// within the edit's reach (for kSource also the floor) have the edit's datum.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  kSource,       // the source's own; the floor has that of the last source that refers to a geoid
+  kSource,       // the source's own; the floor: that of the source with the lowest precedence that has a geoid
 };
 
 class AveragesBudget;
@@ -87,7 +87,7 @@ struct DemFile {
   // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
   int rank = 0;
   bool skip_if_no_raster =
-      false;  // found in a folder: neither a file that is no raster nor a raster of voids is an error
+      false;  // for files of a folder: those that are no rasters are skipped, and rasters may have only voids
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 

@@ -99,7 +99,7 @@ ContentHash ContentBelow(const ElevationModel& model, const geo::TileKey& top, i
   // from, so that a source beyond the neighbours does not matter.
   const auto add_range = [&](const geo::TileKey& key) {
     if (key.y < 0 || key.y >= geo::TileRows(key.level)) return;
-    const HeightRange range = RangeBound(key);
+    const HeightRange range = model.RangeBound(key);
     hasher.Add(range.min);
     hasher.Add(range.max);
   };
@@ -108,7 +108,7 @@ ContentHash ContentBelow(const ElevationModel& model, const geo::TileKey& top, i
     const std::int64_t side = std::int64_t{1} << down;
     const geo::TileKey first{level, top.x << down, top.y << down};
     if (level > model.max_source_level()) {
-      for (const auto& [dx, dy] : RimOf(Available(level), first, side)) {
+      for (const auto& [dx, dy] : RimOf(model.Available(level), first, side)) {
         hasher.Add(dx);
         hasher.Add(dy);
         add_range(geo::Neighbour(first, static_cast<int>(dx), static_cast<int>(dy)));
@@ -123,8 +123,8 @@ ContentHash ContentBelow(const ElevationModel& model, const geo::TileKey& top, i
   }
   // At a pole, edges depend on the range of the whole dataset.
   if (top.y == 0 || top.y == geo::TileRows(top.level) - 1) {
-    hasher.Add(info().heights.min);
-    hasher.Add(info().heights.max);
+    hasher.Add(model.info().heights.min);
+    hasher.Add(model.info().heights.max);
   }
   return hasher.Hash();
 }

@@ -31,16 +31,16 @@ class ElevationModel {
   // raster; a raster that may have undeclared voids takes up to four passes. Relative paths are resolved at each use:
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
   // Paths name files; a program lists the files of a folder itself and sets DemFile::skip_if_no_raster.
-  // Errors name the file, the fault and the remedy. kNotFound: there is no such file, all files were skipped, or a
-  // raster has no height; with skip_if_no_raster, no raster has one. kInvalidArgument: an option, a reference system, a
-  // raster or an edit that cannot be used, also if the edit's file or raster cannot be read.
-  // kUnavailable: a file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
+  // Errors name the file, the fault and the remedy. kNotFound: a file does not exist; a raster has no height; or,
+  // with skip_if_no_raster, all files were skipped or none has a height. kInvalidArgument: an option, a reference
+  // system, a raster or an edit that cannot be used, also if the edit's file or raster cannot be read. kUnavailable: a
+  // file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
-  // are missing, and no file has another error. Otherwise the first other error is returned; if DemOptions::fault is
-  // set, it has been called with each of them.
+  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: the only fault is that
+  // statistics are missing. If files have other faults, the error of the first of these is returned;
+  // DemOptions::fault, if set, has been called with each of these.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -95,8 +95,8 @@ class ElevationModel {
   // sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has no effect.
   // `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is void in the
   // source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the sources,
-  // heights that they set count if `datum` is kEllipsoid; in other datums they are NaN. A height does not depend on the
-  // other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
+  // the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A height does not
+  // depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

@@ -51,9 +51,9 @@ class Imagery {
                                                const FileContentOptions& content = {});
   ~Imagery();
 
-  // Returns the number of pixels along the edge of a level's tiles: `max_side`, halved down to 256 while the pixels are
-  // still as fine as the image. Depends only on image, level and `max_side`. Precondition: `max_side` is a power of two
-  // from kMinSide to kMaxSide.
+  // Returns the number of pixels along the edge of a level's tiles: `max_side`, halved as long as the result is at
+  // least 256 and the pixels are as fine as those of the image. Depends only on image, level and `max_side`.
+  // Precondition: `max_side` is a power of two from kMinSide to kMaxSide.
   int SideOf(int level, int max_side) const;
 
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
@@ -63,9 +63,10 @@ class Imagery {
   // stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
-  // Pictures for maps, by the rules of Read: `side` x `side` pixels of a Web Mercator grid, the first in `column` and
-  // `row`, or of a tile in the scheme of terrain tiles. Transparent where the image has no colour. Preconditions: a
-  // depth of 0 .. geo::kMaxLevel; the pixels lie in the grid; a valid key; a side as above. Errors: those of Read.
+  // Pictures for maps with `side` x `side` pixels, by the rules of Read. ReadMercator: of a Web Mercator grid, from the
+  // pixel in `column` and `row`. ReadGeodetic: of a tile in the scheme of terrain tiles. Transparent where the image
+  // has no colour. Preconditions: a depth of 0 .. geo::kMaxLevel; the pixels lie in the grid; a valid key; a side as
+  // above. Errors: those of Read.
   Result<MapPicture> ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
                                   std::stop_token stop = {}) const;
   Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;

@@ -8,9 +8,9 @@
 
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. Positions are whole numbers of steps of a grid that depends on level, error and
-// WidthOf: kDraco and kNone have one grid, kQuantized and kMeshopt another, which may be coarser. Both forms of a pair
-// decode to the same positions, bit for bit.
+// How the mesh of a GLB tile is stored. Positions are rounded to a grid that depends on level, error and WidthOf, and
+// stored as integers or as floats. kDraco and kNone have one grid and decode to the same positions, bit for bit; so do
+// kQuantized and kMeshopt, whose grid may be coarser.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats

@@ -46,7 +46,7 @@ const TileFormatRow* TakeFormat(std::string_view& name, std::string_view folder 
 
 // The first row of a format in a folder; null if there is none. TileJSON documents use its suffix by default.
 const TileFormatRow* FirstFormatIn(std::string_view folder);
-// The row of a format for pictures in this picture format; null if there is none.
+// The row of a tile format whose pictures are files of type `picture`; null if there is none.
 const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
 
 // Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies
@@ -57,8 +57,8 @@ Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::spa
 // its latitudes.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
 
-// Checks that an archive has the tiles of this format that `query` asks for: a document that appends `query` to its URLs
-// must not link to absent tiles. Datasets with sources have them all. kNotFound: some level lacks them. Errors of
+// Checks that an archive has the tiles of this format that `query` asks for: a document that appends `query` to its
+// URLs must not link to absent tiles. Datasets with sources have them all. kNotFound: some level lacks them. Errors of
 // TileFormatRow::read.
 Result<void> CheckHasQueriedTiles(const DatasetView& dataset, tiler::TileFormat format, std::string_view query);
 

@@ -406,8 +406,8 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
   }
 }
 
-// Returns false if the connection must be closed. `response` must outlive the call, and may be released if it can be
-// made again.
+// Returns false if the connection must be closed. `response` must outlive the call; if it can be made again, its body
+// may be replaced.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   if (can_respond_again) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
@@ -442,7 +442,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
-  // ClientLeft may have sent the first bytes of the reply, to test the connection.
+  // While the session waited, ClientLeft may have sent the first bytes of a reply as a probe (client_watch.h).
   Skip(stream_.TakeBytesSentAhead(), left);
   // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);

@@ -36,7 +36,7 @@ namespace terrace::server {
 template <typename Key, typename Value, typename Hash = std::hash<Key>>
 class SingleFlight {
  public:
-  using Build = Work<Value>;
+  using BuildWork = Work<Value>;
 
   struct FlightResult {
     FlightResult() = default;
@@ -56,7 +56,7 @@ class SingleFlight {
   // `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the flight's job. kCancelled: the deadline
   // passed, the awaiting coroutine was cancelled, or the pool was cancelled before `build` began. kUnavailable: the
   // pool was cancelled before this call. Otherwise the result of `build`.
-  asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobTerms terms);
+  asio::awaitable<FlightResult> Join(Key key, std::string name, BuildWork build, JobTerms terms);
 
   std::size_t in_flight() const {
     const std::lock_guard lock(mutex_);
@@ -69,8 +69,8 @@ class SingleFlight {
   class WaitGuard;
   using FlightPtr = std::shared_ptr<Flight>;
 
-  void Launch(const FlightPtr& flight, Build build, JobTerms terms);
-  void RunFlight(const FlightPtr& flight, const Build& build);
+  void Launch(const FlightPtr& flight, BuildWork build, JobTerms terms);
+  void RunFlight(const FlightPtr& flight, const BuildWork& build);
   void Fail(const FlightPtr& flight, const PoolJob* job, Error error);
   void Complete(const FlightPtr& flight, Result<Value> outcome);
   void Forget(const FlightPtr& flight);  // mutex_ is held
@@ -125,7 +125,7 @@ class SingleFlight<Key, Value, Hash>::WaitGuard {
 
 template <typename Key, typename Value, typename Hash>
 asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFlight<Key, Value, Hash>::Join(
-    Key key, std::string name, Build build, JobTerms terms) {
+    Key key, std::string name, BuildWork build, JobTerms terms) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor, terms.deadline);
   std::unique_lock lock(mutex_);
@@ -160,7 +160,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
 
 // mutex_ is not held: the pool may displace another flight's job.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, Build build, JobTerms terms) {
+void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, BuildWork build, JobTerms terms) {
   PoolJobPtr job;
   Result<void> submitted;
   try {
@@ -192,7 +192,7 @@ void SingleFlight<Key, Value, Hash>::Fail(const FlightPtr& flight, const PoolJob
 
 // On a worker thread.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::RunFlight(const FlightPtr& flight, const Build& build) {
+void SingleFlight<Key, Value, Hash>::RunFlight(const FlightPtr& flight, const BuildWork& build) {
   std::vector<std::weak_ptr<PoolJob>> others;
   {
     const std::lock_guard lock(mutex_);

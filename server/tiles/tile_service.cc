@@ -45,8 +45,8 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
                                                        JobClock::time_point deadline, std::uint64_t client) {
   using Flights = decltype(flights_);
   const tiler::CacheKey key = KeyOf(*catalog, request);
-  Flights::Build find_or_build = [this, catalog = std::move(catalog), request, key,
-                                  requested_at = JobClock::now()](const std::stop_token& stop) {
+  Flights::BuildWork find_or_build = [this, catalog = std::move(catalog), request, key,
+                                      requested_at = JobClock::now()](const std::stop_token& stop) {
     const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
     bool is_built = false;
     // Looks in memory again: an earlier flight may have ended between Find and the start of this one.

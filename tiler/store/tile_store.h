@@ -24,8 +24,8 @@ namespace terrace::tiler {
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
   std::uint64_t generation = 0;  // Dataset::cache_generation(), with the dataset from TilePipeline::datasets()
-  // TileEditsHash (tiler/dataset.h); 0 for a dataset that has only baked tiles. So tiles that an edit does not touch
-  // stay valid when it changes.
+  // TileEditsHash (tiler/dataset.h): only of edits that the tile depends on, so that a change of an edit leaves other
+  // tiles valid. 0 for a dataset that has only baked tiles.
   std::uint64_t edits = 0;
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;
@@ -51,7 +51,7 @@ struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
   bool on = false;            // values are found and written; false: switched off, or it can only read or only write
   // For a store on a network: look-ups that timed out; look-ups that were skipped, because the store was switched off
-  // or look-ups of that kind rarely succeed; how often it was switched off.
+  // or seldom has such tiles; how often it was switched off.
   std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;
 };
 

@@ -21,8 +21,8 @@
 
 namespace terrace::tiler {
 
-// Writes the header lines of replies that describe the tile. The request is that of its CacheKey, so its `dataset` is
-// always 0.
+// Writes those header lines of a reply that describe the tile. The TileRequest is CacheKey::request, whose `dataset` is
+// 0.
 using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 
 class TileTiers {

@@ -42,7 +42,7 @@ struct TileRequest {
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
-  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only: if there is an image
+  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only; no effect without an image
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
