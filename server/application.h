@@ -67,7 +67,8 @@ class TerrainApplication final : public Application, public ServerStatus {
   std::uint64_t replaced() const;  // how often a catalog has replaced another
 
  private:
-  class Handler;
+  class Handler;  // of one connection
+  // What the handlers of URLs answer from; one for each catalog.
   using HandlerStatePtr = std::shared_ptr<const HandlerState>;
 
   bool draining() const override { return parts_.limits.connections.draining(); }

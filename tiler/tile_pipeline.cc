@@ -12,7 +12,7 @@
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/bound_at_samples.h"
+#include "tiler/mesh/error_allowed_at_samples.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/refinement_cache.h"
@@ -126,7 +126,7 @@ Result<DrawnTriangles> TrianglesOf(RefinementCache& refinements, const Dataset& 
     return DecodeTriangles(baked->bytes, request.key);
   }
   const double error_m =
-      BoundAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+      ErrorAllowedAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(refinements, dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
@@ -198,7 +198,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = BoundAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = ErrorAllowedAtSamples(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(*refinements_, dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);

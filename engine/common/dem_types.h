@@ -37,12 +37,12 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
-// convert them to the ellipsoid and back, which may change them by millimetres; they stay unchanged if all sources
-// within the edit's reach (for kSource also the floor) have the edit's datum.
+// convert these heights to the ellipsoid and back, which may change them by millimetres. They come back unchanged if
+// all sources within the edit's reach have its datum, and, for kSource, the floor as well.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  kSource,       // the source's own; the floor: that of the source with the lowest precedence that has a geoid
+  kSource,       // the source's own; where the floor is used, that of the last source by precedence that has a geoid
 };
 
 class AveragesBudget;

@@ -14,8 +14,8 @@ namespace terrace::proto {
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats
-  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 of these
-               // steps or more
+  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; float positions where a tile spans 2^16
+               // steps of its grid or more
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
 
@@ -24,7 +24,7 @@ inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", Glb
                                                                    {"quantized", GlbCompression::kQuantized},
                                                                    {"meshopt", GlbCompression::kMeshopt}}};
 
-// The width of positions for a form.
+// The number type of positions with a compression.
 constexpr PositionWidth WidthOf(GlbCompression compression) {
   const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
   return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;

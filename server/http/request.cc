@@ -256,7 +256,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   request.keep_alive = WantsKeepAlive(fields);
   request.method_name = std::string(fields.method_string());
   RequestFields said = FieldsOf(fields);
-  // RFC 9112, section 3.2.2: overrides Host. Remember does not accept such targets.
+  // RFC 9112, section 3.2.2: the host of an absolute target overrides Host. Remember() refuses such targets.
   if (const std::optional<std::string_view> rest = AfterScheme(fields.target())) {
     said.host = std::string(rest->substr(0, rest->find_first_of("/?#")));
     if (said.host.empty() || !IsHostValue(said.host)) return Bad(400, "malformed host in the request target");

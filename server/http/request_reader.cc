@@ -16,8 +16,8 @@ BadRequest Gone() { return BadRequest{0, ""}; }
 
 RequestReader::RequestReader(Stream& stream, ReadTimeouts timeouts) : stream_(stream), timeouts_(timeouts) {}
 
-void RequestReader::EndAfterNext(std::chrono::milliseconds grace) {
-  ends_after_next_ = true;
+void RequestReader::EndSoon(std::chrono::milliseconds grace) {
+  is_ending_ = true;
   close_at_ = std::min(close_at_, Stream::Clock::now() + grace);
   if (waiting_) stream_.ExpiresAt(std::min(stream_.deadline(), close_at_));
 }
@@ -68,7 +68,7 @@ asio::awaitable<RequestReader::HeadOutcome> RequestReader::ReadHead(Request& req
     if (got) continue;
     if (stream_.expired() && begun) co_return refused(TooSlow());
     if (!stream_.expired() || !stream_.socket().is_open()) co_return std::nullopt;
-    EndAfterNext();  // the wait is over, but a request may have arrived at the same time
+    EndSoon();  // the wait is over, but a request may have arrived at the same time
   }
 }
 

@@ -29,7 +29,7 @@ class RequestReader {
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
   // Returns nothing if the connection has ended, was idle for too long, or no request came within the grace of
-  // EndAfterNext.
+  // EndSoon.
   // `now`: the current time, or shortly before.
   using HeadOutcome = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<HeadOutcome> ReadHead(Request& request, Stream::Clock::time_point now);
@@ -38,11 +38,11 @@ class RequestReader {
   // that the client left or the stream was cancelled.
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
-  // Makes the next request the last one. It is waited for until `grace` has passed from now; a request that has begun
-  // by then is read.
-  void EndAfterNext(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
+  // Ends the connection after the request that is being served. If none is, one more is waited for until `grace` has
+  // passed from now; a request that has begun by then is read.
+  void EndSoon(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
   bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
-  bool ends_after_next() const { return ends_after_next_; }
+  bool is_ending() const { return is_ending_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 
   // Discards what was read, then reads and discards until the client ends its sending or `max_bytes` bytes have come.
@@ -63,7 +63,7 @@ class RequestReader {
   HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;
-  bool ends_after_next_ = false;
+  bool is_ending_ = false;
   Stream::Clock::time_point close_at_ = Stream::Clock::time_point::max();  // unless a request has begun
 };
 

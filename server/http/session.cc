@@ -106,18 +106,18 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   }
   void EvictHere() {
     hurried_ = true;
-    reader_.EndAfterNext();
+    reader_.EndSoon();
     if (phase() == Phase::kServes) return;                    // a request has arrived meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
-  void DrainHere() { reader_.EndAfterNext(context_->options.drain_grace); }
+  void DrainHere() { reader_.EndSoon(context_->options.drain_grace); }
   void AbortHere() {
-    reader_.EndAfterNext();
+    reader_.EndSoon();
     stream_.Reset();
   }
 
-  // Gives up the request's body for others. While a reply is being sent, there is no body. While a body is being
-  // received, it may already hold memory of the budget although has_upload_ is not set yet.
+  // Does nothing while a reply is being sent: the body is released by then. A body that is being received may hold
+  // memory before has_upload_ is set, so it counts as well: ReceiveBody checks displaced_.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
@@ -386,7 +386,7 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
     TransferBudget::HoldRequest hold_request = HoldRequestOf(response);
     const std::size_t bytes = hold_request.bytes;
     hold_request.body = nullptr;
-    Response bare;  // the header lines of `response` would keep its body alive
+    Response bare;  // response.lines may share ownership of the tile, and so of the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
     auto room =
@@ -434,7 +434,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   exchange_.request.body = RequestBody();  // released before the client reads the reply
   HeadOptions options;
   options.version = request.version;
-  options.keep_alive = request.keep_alive && !response.close && !reader_.ends_after_next();
+  options.keep_alive = request.keep_alive && !response.close && !reader_.is_ending();
   options.is_private = request.is_private;
   options.cors = &context_->cors;
   options.origin = request.fields->origin;

@@ -66,24 +66,24 @@ void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
   if (length == kLong) ++long_waiting_;
 }
 
-bool FairQueue::HasNext(bool ignores_long_limit) const {
-  return size_ > long_waiting_ || (size_ > 0 && MayRunLong(ignores_long_limit));
+bool FairQueue::HasNext(bool any_number_of_long) const {
+  return size_ > long_waiting_ || (size_ > 0 && MayRunLong(any_number_of_long));
 }
 
 // Returns null if no job may run.
-PoolJobPtr* FairQueue::FirstOf(Client& client, bool ignores_long_limit) const {
+PoolJobPtr* FairQueue::FirstOf(Client& client, bool any_number_of_long) const {
   Waiting &shorter = client.waiting[kShort], &longer = client.waiting[kLong];
-  const bool may_long = !longer.empty() && MayRunLong(ignores_long_limit);
+  const bool may_long = !longer.empty() && MayRunLong(any_number_of_long);
   if (shorter.empty()) return may_long ? &longer.begin()->second : nullptr;
   if (!may_long || shorter.begin()->first <= longer.begin()->first) return &shorter.begin()->second;
   return &longer.begin()->second;
 }
 
-PoolJobPtr FairQueue::Take(JobClock::time_point now, bool ignores_long_limit) {
+PoolJobPtr FairQueue::Take(JobClock::time_point now, bool any_number_of_long) {
   Client* best = nullptr;
   double best_used = 0;
   for (auto& [number, client] : clients_) {
-    if (FirstOf(client, ignores_long_limit) == nullptr) continue;
+    if (FirstOf(client, any_number_of_long) == nullptr) continue;
     const double used = client.UsedAt(now);
     const bool is_first =
         best == nullptr || used < best_used || (used == best_used && client.last_turn < best->last_turn);
@@ -92,7 +92,7 @@ PoolJobPtr FairQueue::Take(JobClock::time_point now, bool ignores_long_limit) {
     best_used = used;
   }
   if (best == nullptr) return nullptr;
-  const PoolJobPtr job = *FirstOf(*best, ignores_long_limit);
+  const PoolJobPtr job = *FirstOf(*best, any_number_of_long);
   best->started.push_back(now);
   Erase(*best, job);
   best->last_turn = next_turn_++;

@@ -65,10 +65,10 @@ class FairQueue {
   void Push(PoolJobPtr job, JobClock::time_point now);
 
   // Takes the next job, which counts as running from now on. Returns null if there is none, or only long jobs that must
-  // wait for others to end. `ignores_long_limit`: long jobs do not wait for
-  // others.
-  PoolJobPtr Take(JobClock::time_point now, bool ignores_long_limit = false);
-  bool HasNext(bool ignores_long_limit = false) const;
+  // wait for others to end. `any_number_of_long`: long jobs do not wait
+  // for others.
+  PoolJobPtr Take(JobClock::time_point now, bool any_number_of_long = false);
+  bool HasNext(bool any_number_of_long = false) const;
 
   // Call this when a job from Take has ended.
   void Finish(const PoolJobPtr& job, JobClock::time_point now);
@@ -110,8 +110,8 @@ class FairQueue {
 
   const Mean& MeanOf(const JobTerms& terms) const { return means_[terms.kind % kKinds]; }
   static Length LengthOf(const PoolJob& job) { return job.terms.is_long ? kLong : kShort; }
-  bool MayRunLong(bool ignores_long_limit) const { return ignores_long_limit || long_running_ < max_long_; }
-  PoolJobPtr* FirstOf(Client& client, bool ignores_long_limit) const;
+  bool MayRunLong(bool any_number_of_long) const { return any_number_of_long || long_running_ < max_long_; }
+  PoolJobPtr* FirstOf(Client& client, bool any_number_of_long) const;
   void Erase(Client& client, const PoolJobPtr& job);
   void Leave(Clients::iterator client);
 

@@ -99,7 +99,7 @@ void WorkerPool::Serve() {
   std::unique_lock lock(mutex_);
   for (;;) {
     wake_.wait(lock, [this] { return shut_down_ || queue_.HasNext(); });
-    PoolJobPtr job = queue_.Take(now_(), /*ignores_long_limit=*/shut_down_);
+    PoolJobPtr job = queue_.Take(now_(), /*any_number_of_long=*/shut_down_);
     if (!job) return;  // shut down
     --idle_;
     lock.unlock();

@@ -8,7 +8,7 @@
 
 #include "engine/dem/tile_edits.h"
 #include "engine/tin/scan/triangle_rows.h"
-#include "tiler/mesh/bound_at_samples.h"
+#include "tiler/mesh/error_allowed_at_samples.h"
 
 namespace terrace::tiler {
 
@@ -18,7 +18,7 @@ tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey&
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
-  for (float& cap : demands.caps) cap = static_cast<float>(BoundAtSamples(static_cast<double>(cap)));
+  for (float& cap : demands.caps) cap = static_cast<float>(ErrorAllowedAtSamples(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
   limits.caps = std::move(demands.caps);
   limits.forced = std::move(demands.forced);
