@@ -45,7 +45,7 @@ class SingleFlightTest : public testing::Test {
   explicit SingleFlightTest(unsigned threads = 2) : pool_(threads, 10'000) {}
   void TearDown() override { pool_.Shutdown(); }  // its jobs refer to the flights
 
-  void Join(Flights::Build build, JobClock::time_point deadline,
+  void Join(Flights::BuildWork build, JobClock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
       flights_done_.push_back(std::move(flight));
@@ -53,7 +53,7 @@ class SingleFlightTest : public testing::Test {
     asio::co_spawn(io_, flights_.Join(0, "it", std::move(build), Until(deadline)),
                    asio::bind_cancellation_slot(slot, keep));
   }
-  void JoinAs(std::size_t key, JobTerms terms, Flights::Build build,
+  void JoinAs(std::size_t key, JobTerms terms, Flights::BuildWork build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
       flights_done_.push_back(std::move(flight));
