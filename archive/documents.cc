@@ -45,7 +45,10 @@ dem::GeoBounds HeightTileBounds(const Manifest& manifest) {
   };
   const dem::GeoBounds north_west = bounds_of(all.start_x, all.start_y), south_east = bounds_of(all.end_x, all.end_y);
   const auto common = dem::CommonBounds(data, {north_west.west, south_east.south, south_east.east, north_west.north});
-  return common.size() == 1 ? common.front() : data;  // two: on both sides of the antimeridian, as the dataset is
+  if (common.empty()) return data;
+  // Two: on both sides of the antimeridian, as the dataset is.
+  return common.size() == 1 ? common.front()
+                            : dem::GeoBounds{data.west, common.front().south, data.east, common.front().north};
 }
 
 std::string TileJson(const Manifest& manifest) {

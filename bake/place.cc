@@ -35,7 +35,7 @@ struct ProcessState {
   std::string start;  // in the kernel's ticks; differs for a later process with the same number
 
   static ProcessState Of(long pid) {
-    const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid));
+    const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid)).value_or("");
     const std::size_t name_end = stat.rfind(')');
     if (name_end == std::string::npos) return {};
     ProcessState process;
@@ -58,7 +58,7 @@ std::string NumberSpace() {
 
 std::string FirstWord(const char* path) {
   std::string word;
-  std::istringstream(ReadText(path)) >> word;
+  std::istringstream(ReadText(path).value_or("")) >> word;
   return word.empty() ? kUnknown : word;
 }
 
@@ -75,7 +75,7 @@ std::string MachineOf() {
 
 // The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers, machine.
 struct Owner {
-  std::string host, pid, start, boot, space, machine;
+  std::string host = kUnknown, pid = kUnknown, start, boot = kUnknown, space, machine = kUnknown;
 
   static Owner Parse(const std::string& text) {
     Owner owner;
@@ -149,9 +149,19 @@ Result<std::string> OtherLock(const std::string& place, const std::string& own) 
   for (const std::string& name : *names) {
     if (!IsLock(name) || name == own || (division(name) == division(own) && name != "bake.lock")) continue;
     const std::string file = place + "/" + name;
-    if (!Owner::Parse(ReadText(file)).HasEnded()) return file;
+    const Result<std::string> text = ReadText(file);
+    if (!text && text.error().code == ErrorCode::kNotFound) continue;  // removed meanwhile
+    if (!text) return tl::unexpected(text.error());
+    if (!Owner::Parse(*text).HasEnded()) return file;
   }
   return std::string();
+}
+
+// `why`: of CreateFile. Messages of buckets name the object and the remedy already.
+tl::unexpected<Error> CannotCreate(const std::string& file, const Error& why) {
+  if (archive::IsBucket(file)) return tl::unexpected(why);
+  return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a place with room that can be written",
+                   file, why.message);
 }
 
 // Whether it is a file or folder of tiles.
@@ -213,18 +223,17 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
       const Result<std::string> other = OtherLock(place, fs::path(file).filename().string());
       if (!other) return tl::unexpected(other.error());
       if (other->empty()) return lock;
-      const Owner owner = Owner::Parse(ReadText(*other));
+      const Owner owner = Owner::Parse(ReadText(*other).value_or(""));
       return MakeError(ErrorCode::kOverloaded,
                        "{}: process {} on host {} is baking there, all of it or another division into shards; wait for "
                        "it, or remove {} if that process has ended",
                        place, owner.pid, owner.host, *other);
     }
-    if (!created) {
-      return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a place with room that can be written",
-                       file, created.error().message);
-    }
-    const std::string text = ReadText(file);
-    const Owner owner = Owner::Parse(text);
+    if (!created) return CannotCreate(file, created.error());
+    const Result<std::string> text = ReadText(file);
+    if (!text && text.error().code == ErrorCode::kNotFound) continue;  // removed meanwhile
+    if (!text) return tl::unexpected(text.error());
+    const Owner owner = Owner::Parse(*text);
     if (!owner.HasEnded()) {
       return MakeError(ErrorCode::kOverloaded,
                        "{}: process {} on host {} is baking there; wait for it, or remove {} if that process has ended",
@@ -237,7 +246,7 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
     }
     const std::string stale = OwnPartial(file);
     if (::rename(file.c_str(), stale.c_str()) != 0) continue;
-    if (ReadText(stale) != text) ::link(stale.c_str(), file.c_str());
+    if (ReadText(stale).value_or("") != *text) ::link(stale.c_str(), file.c_str());
     ::unlink(stale.c_str());
   }
   return MakeError(ErrorCode::kOverloaded, "{}: another bake has just begun there; wait for it", place);
@@ -247,7 +256,7 @@ PlaceLock::PlaceLock(PlaceLock&& other) noexcept : file_(std::exchange(other.fil
 
 PlaceLock::~PlaceLock() {
   // In a bucket, another process may have replaced it.
-  if (!file_.empty() && ReadText(file_) == OwnLock() + '\n') Remove(file_);
+  if (!file_.empty() && ReadText(file_).value_or("") == OwnLock() + '\n') Remove(file_);
 }
 
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
@@ -261,17 +270,20 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
                      "{}: holds something that is no bake ({}); give an empty or a new folder with --out", place, name);
   }
   const fs::path file = fs::path(place) / kIdentityFile;
-  bool is_known = Exists(file);
-  if (is_known) {
-    if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
-  }
+  const auto check_noted = [&]() -> Result<void> {
+    const Result<std::string> noted = ReadText(file);
+    return noted ? CheckSame(place, *noted, identity, file.string()) : tl::unexpected(noted.error());
+  };
+  const Result<void> noted = check_noted();
+  bool is_known = noted.has_value();
+  if (!noted && noted.error().code != ErrorCode::kNotFound) return noted;
   std::vector<std::string> archives = {place};
   for (const auto& [name, format] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
   for (const std::string& archive : archives) {
-    if (!Exists(fs::path(archive) / archive::kManifestFile)) continue;
-    is_known = true;
     const auto manifest = archive::ReadManifest(archive);
+    if (!manifest && manifest.error().code == ErrorCode::kNotFound) continue;
     if (!manifest) return tl::unexpected(manifest.error());
+    is_known = true;
     if (auto same = CheckSame(place, manifest->identity, identity, archive); !same) return same;
     if (manifest->dataset.generation != generation) {
       return MakeError(ErrorCode::kInvalidArgument,
@@ -286,11 +298,8 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
                      place, content, kIdentityFile, archive::kManifestFile);
   }
   const Result<bool> created = CreateFile(file.string(), ToJson(identity));
-  if (!created) {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), created.error().message);
-  }
-  if (!*created)
-    return CheckSame(place, ReadText(file), identity, file.string());  // it was there, or is of another shard
+  if (!created) return CannotCreate(file.string(), created.error());
+  if (!*created) return check_noted();  // it was there, or is of another shard
   return {};
 }
 
@@ -309,7 +318,7 @@ void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& fold
   }
   for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
     const fs::path file = fs::path(place) / name;
-    if (IsLock(name) && Owner::Parse(ReadText(file)).HasEnded()) leftovers.push_back(file);
+    if (IsLock(name) && Owner::Parse(ReadText(file).value_or("")).HasEnded()) leftovers.push_back(file);
   }
   for (const fs::path& file : leftovers) Remove(file);
 }
@@ -343,18 +352,20 @@ Result<std::string> PlaceId(const std::string& place) {
   const fs::path file = fs::path(place) / kPlaceIdFile;
   std::random_device random;
   const Result<bool> created = CreateFile(file.string(), fmt::format("{:08x}{:08x}", random(), random()));
+  if (!created) return CannotCreate(file.string(), created.error());
+  const Result<std::string> text = ReadText(file);
+  if (!text) return tl::unexpected(text.error());
   std::string id;
-  std::istringstream(ReadText(file)) >> id;
+  std::istringstream(*text) >> id;
   if (!id.empty()) return id;
-  return MakeError(ErrorCode::kUnavailable, "{}: cannot be {}: {}", file.string(), created ? "read" : "written",
-                   created ? ErrorText(EIO) : created.error().message);
+  return MakeError(ErrorCode::kUnavailable, "{} is empty; remove it", file.string());
 }
 
 bool TidyIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
-    if (!Exists(folders.back() / archive::kManifestFile)) return false;
+    if (!Exists(folders.back() / archive::kManifestFile).value_or(false)) return false;
   }
   RemoveLeftovers(place, folders);
   Remove(fs::path(place) / kPlaceIdFile);

@@ -31,21 +31,32 @@ std::string OwnPartial(const std::string& file) {
   return fmt::format("{}.{}.{}.{:08x}.partial", file, HostName(), ::getpid(), random);
 }
 
-bool Exists(const fs::path& file) {
-  std::error_code ignored;
-  return archive::IsBucket(file.string()) ? archive::InputFile::Open(file.string()).has_value()
-                                          : fs::exists(file, ignored);
+Result<bool> Exists(const fs::path& file) {
+  if (!archive::IsBucket(file.string())) {
+    std::error_code error;
+    const bool is_there = fs::exists(file, error);
+    if (!error) return is_there;
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up: {}", file.string(), error.message());
+  }
+  const auto opened = archive::InputFile::Open(file.string());
+  if (opened) return true;
+  if (opened.error().code == ErrorCode::kNotFound) return false;
+  return tl::unexpected(opened.error());
 }
 
-std::string ReadText(const fs::path& file) {
+Result<std::string> ReadText(const fs::path& file) {
   if (archive::IsBucket(file.string())) {
     constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20;
-    return archive::ReadFile(file.string(), kMaxBytes).value_or("");
+    return archive::ReadFile(file.string(), kMaxBytes);
   }
+  errno = 0;
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+  if (in) text << in.rdbuf();
+  if (in && !in.bad()) return text.str();
+  const int error = errno != 0 ? errno : EIO;
+  return MakeError(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kUnavailable, "{} cannot be read: {}",
+                   file.string(), ErrorText(error));
 }
 
 Result<std::vector<std::string>> NamesIn(const fs::path& folder) {
@@ -75,7 +86,9 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     if (auto put = archive::PutText(content + '\n', file); !put) return tl::unexpected(put.error());
     // Stores have no exclusive creation. Of processes that put at the same time, the last one's content stays.
     std::this_thread::sleep_for(std::chrono::seconds(1));
-    return ReadText(file) == content + '\n';
+    const Result<std::string> text = ReadText(file);
+    if (!text && text.error().code != ErrorCode::kNotFound) return tl::unexpected(text.error());
+    return text && *text == content + '\n';
   }
   const std::string own = OwnPartial(file);
   {

@@ -14,9 +14,10 @@ std::string HostName();
 // The name of this process's temporary file, which is renamed to `file`.
 std::string OwnPartial(const std::string& file);
 
-bool Exists(const std::filesystem::path& file);
-// Empty: there is none.
-std::string ReadText(const std::filesystem::path& file);
+// kUnavailable: it is not known, because the folder or the bucket cannot be read now.
+Result<bool> Exists(const std::filesystem::path& file);
+// The whole file, of 1 MiB at most. kNotFound: there is none. kUnavailable: it cannot be read. Messages name it.
+Result<std::string> ReadText(const std::filesystem::path& file);
 // The names directly below a folder. Errors: there is no such folder, it cannot be read, or it is in a bucket and
 // without objects (archive::NamesInBucket).
 Result<std::vector<std::string>> NamesIn(const std::filesystem::path& folder);

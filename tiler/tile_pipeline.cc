@@ -37,17 +37,21 @@ Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request
   return **std::move(found);
 }
 
-tl::unexpected<Error> NoSources() {
-  return MakeError(ErrorCode::kNotFound,
-                   "the dataset is an archive of finished tiles without its sources, which this needs; heights of the "
-                   "tiles themselves are available with surface=served");
+bool HasBakedMeshes(const Dataset& dataset) {
+  const std::vector<TileFormat>& formats = dataset.baked->extent().formats;
+  return std::ranges::find(formats, TileFormat::kQuantizedMesh) != formats.end();
+}
+
+tl::unexpected<Error> NoSources(const Dataset& dataset) {
+  return MakeError(
+      ErrorCode::kNotFound, "the dataset is an archive of finished tiles without its sources, which this needs{}",
+      HasBakedMeshes(dataset) ? "; heights of the tiles themselves are available with surface=served" : "");
 }
 
 // Whether an archive has the tiles that a drawn surface is read from. GLB tiles of archives are not decoded.
 Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface) {
   if (dataset.model) return {};
-  const std::vector<TileFormat>& formats = dataset.baked->extent().formats;
-  const bool has = std::ranges::find(formats, TileFormat::kQuantizedMesh) != formats.end();
+  const bool has = HasBakedMeshes(dataset);
   if (has && surface.format == TileFormat::kQuantizedMesh) return {};
   return MakeError(ErrorCode::kNotFound,
                    "the dataset is an archive of finished tiles alone, and its heights are read from quantized-mesh "
@@ -179,7 +183,7 @@ Result<const Dataset*> TilePipeline::Find(std::uint32_t dataset) const {
 Result<const dem::ElevationModel*> TilePipeline::FindModel(std::uint32_t dataset) const {
   const Result<const Dataset*> found = Find(dataset);
   if (!found) return tl::unexpected(found.error());
-  if (!(*found)->model) return NoSources();
+  if (!(*found)->model) return NoSources(**found);
   return (*found)->model.get();
 }
 
@@ -259,7 +263,7 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
   const Result<const Dataset*> found = Find(dataset);
   if (!found) return tl::unexpected(found.error());
   const Dataset& known = **found;
-  if (!known.model && !surface) return NoSources();
+  if (!known.model && !surface) return NoSources(known);
   if (known.model) {
     if (const Result<void> bounded = CheckSamplesAlong(*known.model, rays); !bounded)
       return tl::unexpected(bounded.error());

@@ -15,6 +15,7 @@
 #include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
+#include "engine/gdal/sample_messages.h"
 #include "engine/sources/located_raster.h"
 #include "engine/sources/raster_warnings.h"
 
@@ -119,17 +120,6 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   info.overview_factors = layout.overview_factors;
   info.transform = georeference.transform();
   return info;
-}
-
-// Doubts about heights in metres that no land or sea floor has, for example if they are in centimetres without a stated
-// unit.
-std::string DoubtsOf(const HeightRange& heights) {
-  constexpr double kHighest = 9000, kDeepest = -11500;
-  if (heights.max <= kHighest && heights.min >= kDeepest) return "";
-  return fmt::format(
-      "heights from {} to {} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {} count as "
-      "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
-      PlainNumber(heights.min), PlainNumber(heights.max), PlainNumber(kMaxAbsHeight));
 }
 
 void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
@@ -237,13 +227,7 @@ Result<void> RasterSource::FindLayout(GDALDataset& dataset, const std::string& p
   const std::string& stated = georeference_.vertical_unit();
   const auto& geoid = vertical_.geoid;
   layout_ = RasterLayout::Of(dataset, georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
-  if (const double scale = layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: states a scale of {}, by which no sample has a height; correct it with `gdal_translate -a_scale "
-        "1 -a_offset 0 in out`",
-        path, scale);
-  }
+  if (auto scaled = CheckScale(layout_.rules, path); !scaled) return scaled;
   layout_.coast_step_m = ZeroEdges::CoastStep(spacing_.finer);
   layout_.rules.extra_nodata = options.nodata;
   return {};
@@ -293,19 +277,7 @@ void RasterSource::LogOpened(GDALDataset& dataset) const {
 }
 
 std::string RasterSource::DescribeLackOfHeights() const {
-  const SampleRules& rules = layout_.rules;
-  return fmt::format(
-      "{}: has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
-      "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
-      "need `-a_scale FACTOR`, the metres of one{}{}",
-      info_.path, PlainNumber(kMaxAbsHeight),
-      MetresPerUnit(rules.unit)
-          ? ""
-          : fmt::format("; the file's unit \"{}\" is not known, and counts as metres", rules.unit),
-      rules.extra_nodata.empty() && rules.void_margin <= 0
-          ? ""
-          : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
-            "configuration \"nodata\": \"declared\") they are not");
+  return terrace::dem::DescribeLackOfHeights(layout_.rules, info_.path);
 }
 
 bool StatisticsPages::Admit(std::size_t bytes) {

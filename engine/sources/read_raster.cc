@@ -1,15 +1,18 @@
 #include "engine/sources/read_raster.h"
 
+#include <fmt/format.h>
 #include <ogr_spatialref.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "engine/common/dem_types.h"
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
 #include "engine/gdal/raster_file.h"
+#include "engine/gdal/sample_messages.h"
 #include "engine/gdal/sample_rules.h"
 #include "engine/statistics/raster_chunk.h"
 #include "engine/statistics/undeclared_nodata.h"
@@ -30,23 +33,28 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   return {};
 }
 
+// Empty: there is no height.
+std::optional<HeightRange> RangeOf(const std::vector<float>& heights) {
+  float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
+  for (const float height : heights) {
+    lowest = std::min(lowest, height);  // ignores NaN, the second argument
+    highest = std::max(highest, height);
+  }
+  if (!(lowest <= highest)) return std::nullopt;
+  return HeightRange{lowest, highest};
+}
+
 // Detects undeclared voids of a raster in memory, by the same rules as for served rasters (raster_statistics.h).
 Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
                                    double spacing_m) {
-  float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
-  bool has_voids = false;
-  for (const float height : raster.heights) {
-    lowest = std::min(lowest, height);  // ignores NaN, the second argument
-    highest = std::max(highest, height);
-    has_voids |= std::isnan(height);
-  }
+  const std::optional<HeightRange> range = RangeOf(raster.heights);
+  const bool has_voids = std::ranges::any_of(raster.heights, [](float height) { return std::isnan(height); });
   ZeroEdges zeros;
   const double coast_step_m = ZeroEdges::CoastStep(spacing_m);
   zeros.Add(raster.heights.data(), raster.width, {0, 0, raster.width, raster.height}, raster.width, raster.height,
             coast_step_m);
   const bool has_collar = zeros.IsCollar(raster.width, raster.height);
-  const bool is_empty = !(lowest <= highest);
-  if (is_empty || !MayHideVoids(rules, lowest, highest, has_voids, has_collar)) return DetectedNodata{};
+  if (!range || !MayHideVoids(rules, range->min, range->max, has_voids, has_collar)) return DetectedNodata{};
   return FindVoids(band, rules, has_collar, coast_step_m);
 }
 
@@ -73,6 +81,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   raster.in_angles = raster.georeferenced && crs != nullptr && crs->IsGeographic() != 0;
   SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
   rules.extra_nodata = options.nodata;
+  if (auto scaled = CheckScale(rules, path); !scaled) return tl::unexpected(scaled.error());
   // With spare capacity, so that tin::HeightField can increase the stride without a copy.
   constexpr std::size_t kRoomOfRow = 32;
   raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
@@ -83,14 +92,23 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
                      error.message);
   };
   if (auto read = ReadAll(band, rules, options.progress, raster); !read) return damaged(read.error());
-  if (!options.find_voids) return raster;
+  const auto finish = [&]() -> Result<RasterHeights> {
+    const std::optional<HeightRange> range = RangeOf(raster.heights);
+    if (!range) return MakeError(ErrorCode::kNotFound, "{}", DescribeLackOfHeights(rules, path));
+    raster.heights_doubted =
+        MetresPerUnit(rules.unit)
+            ? DoubtsOf(*range)
+            : fmt::format("height unit \"{}\" is not known, heights are taken as metres", rules.unit);
+    return std::move(raster);
+  };
+  if (!options.find_voids) return finish();
   const auto detected = FindVoidsOf(raster, band, rules, spacing ? spacing->finer : 0);
   if (!detected) return damaged(detected.error());
-  if (!detected->any()) return raster;
+  if (!detected->any()) return finish();
   raster.found_voids = detected->text;
   detected->AddTo(rules);
   if (auto read = ReadAll(band, rules, {}, raster); !read) return damaged(read.error());
-  return raster;
+  return finish();
 }
 
 }  // namespace terrace::dem

@@ -26,6 +26,7 @@ struct RasterHeights {
   bool in_angles = false;                 // x and y are longitudes and latitudes
   std::string found_voids;                // detected nodata values, for people; empty: none
   std::string picture_color;              // as RasterInfo::picture_color
+  std::string heights_doubted;            // why heights may not be metres, with the remedy; empty: plausible
 };
 Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& options = {});
 

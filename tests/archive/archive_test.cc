@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "archive/documents.h"
 #include "archive/export.h"
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/unit_writer.h"
@@ -222,6 +223,19 @@ TEST_F(ArchiveTest, SingleFileHasItsCentreWhereItsDataAre) {
     EXPECT_NEAR(header.bounds.west, of_header.west, 1e-7);
     EXPECT_NEAR(header.bounds.east, of_header.east, 1e-7);
   }
+}
+
+// Of a part of a dataset across the antimeridian, the rows are those of the archive's tiles.
+TEST_F(ArchiveTest, BoundsOfHeightTilesAreThoseOfTheirRows) {
+  Manifest manifest;
+  manifest.dataset.bounds = {179, 51, -179, 52};
+  manifest.available.resize(11);
+  manifest.available[10] = {{0, 338, 0, 340}, {1023, 338, 1023, 340}};
+  const dem::GeoBounds bounds = HeightTileBounds(manifest);
+  EXPECT_EQ(bounds.west, 179);
+  EXPECT_EQ(bounds.east, -179);
+  EXPECT_NEAR(bounds.south, 51.3992, 1e-4);  // the southern edge of row 340 of 1,024
+  EXPECT_EQ(bounds.north, 52);
 }
 
 }  // namespace

@@ -170,7 +170,8 @@ class Bucket(BakeCase):
         self.assertIn("AccessDenied", errors)
         self.store.close()
         _, errors = self.bake(code=1)
-        self.assertIn("/vsis3/terrain/maps/alps/bake.lock: cannot be written", errors)
+        self.assertIn("/vsis3/terrain/maps/alps/bake.lock cannot be looked up now", errors)
+        self.assertIn("check the endpoint, the credentials and their right to read", errors)
         self.store = FakeS3()
         self.addCleanup(self.store.close)
         nowhere = self.scratch / "full"
@@ -178,6 +179,31 @@ class Bucket(BakeCase):
         _, errors = self.bake(code=1, environment={"TMPDIR": str(nowhere)}, before=("prlimit", "--fsize=1000", "--"))
         self.assertIn(f"{nowhere} cannot be written", errors)
         self.assertNotIn("manifest.json", set(self.files()))
+
+    def test_what_cannot_be_read_is_not_taken_for_absent(self):
+        self.bake()
+        for name in ("manifest.json", "bake.json"):
+            for methods in (("GET", "HEAD"), ("GET",)):
+                self.store.refuse = lambda method, key, query, of=(name, methods): 403 if method in of[1] and key == f"{BELOW}/{of[0]}" else None
+                first = len(self.store.requests)
+                _, errors = self.bake(code=1)
+                self.assertRegex(errors, rf"{PLACE}/{name} cannot be (looked up|opened|read) now")
+                self.assertIn("AccessDenied", errors)
+                self.assertNotIn("remove", errors)
+                put = {key for method, key, _ in self.store.requests[first:] if method == "PUT"}
+                self.assertEqual(put, {f"{BELOW}/bake.lock"})
+        self.store.refuse = lambda method, key, query: None
+        self.expect_all()
+
+    def test_a_lock_that_cannot_be_read_names_no_process(self):
+        lock = f"{BELOW}/bake.lock"
+        self.store.refuse = lambda method, key, query: 403 if method in ("GET", "HEAD") and key == lock and lock in self.store.objects else None
+        _, errors = self.bake(code=1)
+        self.assertRegex(errors, rf"{PLACE}/bake.lock cannot be (looked up|opened|read) now")
+        self.assertNotIn("process", errors)
+        self.store.refuse = lambda method, key, query: None
+        self.bake()  # the lock that stayed is of a process that has ended
+        self.expect_all()
 
     def test_places_that_hold_something_else(self):
         self.store.objects[BELOW + "/photo.jpg"] = b"x"

@@ -74,7 +74,7 @@ std::string NoteOf(const std::string& path, const std::string& form, const bake:
 
 bool WasExported(const std::string& baked, const BakeArguments& arguments, const bake::BakeIdentity& identity,
                  std::uint64_t generation) {
-  const std::string noted = bake::ReadText(fs::path(baked) / bake::kExportFolder / kNoteFile);
+  const std::string noted = bake::ReadText(fs::path(baked) / bake::kExportFolder / kNoteFile).value_or("");
   return !noted.empty() && noted == NoteOf(arguments.out, arguments.form, identity, generation);
 }
 

@@ -69,6 +69,9 @@ void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const 
                "takes them for heights\n",
                path, raster.found_voids);
   }
+  if (!raster.heights_doubted.empty() && raster.picture_color.empty()) {
+    fmt::print(stderr, "terrace: {}: {}\n", path, raster.heights_doubted);
+  }
   if (!raster.picture_color.empty()) {
     fmt::print(stderr,
                "terrace: {}: band 1 says that it is the \"{}\" of a picture: its values are taken for heights; --image "

@@ -47,6 +47,29 @@ TEST(ReadRaster, ReadsRastersWithoutGeoreference) {
   EXPECT_EQ(*std::ranges::max_element(raster->heights), 2478);
 }
 
+TEST(ReadRaster, SaysWhatIsWrongWithHeights) {
+  const TempDir dir;
+  const auto read = [&](const RasterSpec& spec) { return ReadRaster(WriteRaster(dir, spec)); };
+  const auto flat = read({.type = "Int16", .scale = 0, .value = [](int, int) { return 20.0; }});
+  ASSERT_FALSE(flat);
+  EXPECT_EQ(flat.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(flat.error().message.find("states a scale of 0"), std::string::npos) << flat.error().message;
+
+  const auto centimetres = read({.type = "Int32", .value = [](int x, int) { return 60'000.0 + 10'000 * x; }});
+  ASSERT_TRUE(centimetres);
+  EXPECT_NE(centimetres->heights_doubted.find("hardly metres"), std::string::npos) << centimetres->heights_doubted;
+
+  const auto too_high = read({.type = "Int32", .value = [](int, int) { return 200'000.0; }});
+  ASSERT_FALSE(too_high);
+  EXPECT_NE(too_high.error().message.find("heights beyond 99998 m are voids too"), std::string::npos)
+      << too_high.error().message;
+
+  const auto furlongs = read({.type = "Int16", .unit = "furlong", .value = [](int, int) { return 3.0; }});
+  ASSERT_TRUE(furlongs);
+  EXPECT_NE(furlongs->heights_doubted.find("\"furlong\" is not known"), std::string::npos) << furlongs->heights_doubted;
+  EXPECT_EQ(read({.type = "Int16", .value = [](int, int) { return 20.0; }})->heights_doubted, "");
+}
+
 TEST(ReadRaster, NamesAMissingFile) { EXPECT_EQ(ReadRaster("/nowhere/dem.tif").error().code, ErrorCode::kNotFound); }
 
 }  // namespace
