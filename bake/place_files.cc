@@ -8,7 +8,6 @@
 #include <chrono>
 #include <fstream>
 #include <random>
-#include <sstream>
 #include <system_error>
 #include <thread>
 
@@ -49,14 +48,23 @@ Result<std::string> ReadText(const fs::path& file) {
     constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20;
     return archive::ReadFile(file.string(), kMaxBytes);
   }
-  errno = 0;
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  if (in && !in.bad()) return text.str();
-  const int error = errno != 0 ? errno : EIO;
-  return MakeError(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kUnavailable, "{} cannot be read: {}",
-                   file.string(), ErrorText(error));
+  const auto fail = [&](int error) {
+    return MakeError(error == ENOENT ? ErrorCode::kNotFound : ErrorCode::kUnavailable, "{} cannot be read: {}",
+                     file.string(), ErrorText(error));
+  };
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return fail(errno);
+  std::string text;
+  std::array<char, 4096> piece{};
+  for (;;) {
+    const ssize_t read = ::read(descriptor, piece.data(), piece.size());
+    if (read > 0) text.append(piece.data(), static_cast<std::size_t>(read));
+    if (read > 0 || (read < 0 && errno == EINTR)) continue;
+    const int error = read < 0 ? errno : 0;
+    ::close(descriptor);
+    if (error != 0) return fail(error);
+    return text;
+  }
 }
 
 Result<std::vector<std::string>> NamesIn(const fs::path& folder) {

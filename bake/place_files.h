@@ -16,7 +16,8 @@ std::string OwnPartial(const std::string& file);
 
 // kUnavailable: it is not known, because the folder or the bucket cannot be read now.
 Result<bool> Exists(const std::filesystem::path& file);
-// The whole file, of 1 MiB at most. kNotFound: there is none. kUnavailable: it cannot be read. Messages name it.
+// The whole file. kNotFound: there is none. kUnavailable: it cannot be read. kInvalidArgument: an object of more than
+// 1 MiB. Messages name it.
 Result<std::string> ReadText(const std::filesystem::path& file);
 // The names directly below a folder. Errors: there is no such folder, it cannot be read, or it is in a bucket and
 // without objects (archive::NamesInBucket).
@@ -26,7 +27,7 @@ void Remove(const std::filesystem::path& file);
 
 // Creates a file together with its content, so that no process reads it empty. False: there is one already. An
 // object of a bucket is read again a second later: false, too, if another process has replaced it with other content.
-// Errors: the message says only why.
+// Errors: the message says only why; of an object it names the object and the remedy too.
 Result<bool> CreateFile(const std::string& file, const std::string& content);
 
 }  // namespace terrace::bake

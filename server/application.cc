@@ -138,7 +138,7 @@ asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
 
 // Keeps the state alive until the answer is ready. If a source turns out to be replaced, the next catalog answers.
 asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlerStatePtr state, asio::awaitable<Response> answer) {
-  const auto give_up = Clock::now() + kReplaceTime;
+  const auto give_up = std::min<Clock::time_point>(Clock::now() + kReplaceTime, context_.request->deadline);
   for (Answer next = std::move(answer);;) {
     if (auto* later = std::get_if<asio::awaitable<Response>>(&next)) {
       Response response = co_await std::move(*later);

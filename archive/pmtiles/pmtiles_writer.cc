@@ -178,7 +178,7 @@ Result<FileSummary> PmtilesWriter::Finish(std::string_view metadata) {
   header.min_zoom = ZoomOf(waiting_.front().tile_id);
   header.max_zoom = ZoomOf(waiting_.back().tile_id);
   header.bounds = options_.bounds;
-  header.center_longitude = options_.center_longitude;
+  header.center_longitude = options_.center_longitude.value_or((options_.bounds.west + options_.bounds.east) / 2);
 
   Result<OutputFile> out = OutputFile::Create(path_);
   if (!out) return tl::unexpected(std::move(out.error()));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ namespace terrace::archive {
 struct PmtilesOptions {
   PmtilesCompression compression = PmtilesCompression::kNone;  // of the tiles
   PmtilesType type = PmtilesType::kOther;
-  dem::GeoBounds bounds{-180, -90, 180, 90};  // west < east
-  double center_longitude = 0;
+  dem::GeoBounds bounds{-180, -90, 180, 90};    // west < east
+  std::optional<double> center_longitude = {};  // default: the middle of `bounds`
 };
 
 // Used by one thread at a time. Tiles wait in a nameless file, so that they may come in any order.

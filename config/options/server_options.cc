@@ -275,8 +275,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "N",
        .section = "load",
        .help = "Average rate of requests of one client or token; more wait, or get 429; 0 is no limit",
-       .details = "A request above the rate waits. It gets 429 with `Retry-After` if it would wait longer than "
-                  "`request_deadline_s`. `/livez` and `/readyz` do not count; all other requests do, also those "
+       .details = "A request above the rate waits. It gets 429 with `Retry-After` if it would wait longer than half "
+                  "of `request_deadline_s`. `/livez` and `/readyz` do not count; all other requests do, also those "
                   "answered with 404 or 405",
        .codec = Number(&Config::requests_per_second, 0, 1'000'000),
        .other_words = "rate rate_limit"},

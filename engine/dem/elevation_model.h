@@ -38,9 +38,9 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: the only fault is that
-  // statistics are missing. If files have other faults, the error of the first of these is returned;
-  // DemOptions::fault, if set, has been called with each of these.
+  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
+  // are missing. If files have other faults, the error of the first of these is returned instead; with
+  // DemOptions::fault it is not, but each has been reported to it.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 

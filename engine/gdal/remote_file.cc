@@ -14,7 +14,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr const char* kRemedy = "the endpoint, the credentials and their right to read";
+constexpr const char* kReadRemedy = "the endpoint, the credentials and their right to read";
 
 // Whether a failed look-up says that there is no such file; else the store does not answer, or refuses. Stores that are
 // not remote state no error.
@@ -60,11 +60,12 @@ Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
     if (VSILFILE* const there = VSIFOpenExL(path.c_str(), "rb", /*bSetError=*/TRUE)) VSIFCloseL(there);
     const std::string why = VSIGetLastErrorMsg();
     if (IsAbsence(VSIGetLastErrorNo(), why)) return MakeError(ErrorCode::kNotFound, "{} is not there", path);
-    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up now: {}; check {}", path, why, kRemedy);
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up now: {}; check {}", path, why, kReadRemedy);
   }
   VSILFILE* const file = VSIFOpenL(path.c_str(), "rb");
   if (file == nullptr) {
-    return MakeError(ErrorCode::kUnavailable, "{} cannot be opened now: {}; check {}", path, TakeGdalError(), kRemedy);
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be opened now: {}; check {}", path, TakeGdalError(),
+                     kReadRemedy);
   }
   return std::unique_ptr<RemoteFile>(
       new RemoteFile(std::make_unique<Impl>(path, file, static_cast<std::uint64_t>(status.st_size))));
@@ -87,7 +88,7 @@ Result<std::string> RemoteFile::Read(std::uint64_t offset, std::size_t size) con
       VSIFSeekL(impl_->file, offset, SEEK_SET) == 0 && VSIFReadL(bytes.data(), 1, size, impl_->file) == size;
   if (!is_read) {
     return MakeError(ErrorCode::kUnavailable, "{} cannot be read now: {}; check {}", impl_->path, TakeGdalError(),
-                     kRemedy);
+                     kReadRemedy);
   }
   return bytes;
 }

@@ -95,10 +95,12 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   const auto finish = [&]() -> Result<RasterHeights> {
     const std::optional<HeightRange> range = RangeOf(raster.heights);
     if (!range) return MakeError(ErrorCode::kNotFound, "{}", DescribeLackOfHeights(rules, path));
-    raster.heights_doubted =
-        MetresPerUnit(rules.unit)
-            ? DoubtsOf(*range)
-            : fmt::format("height unit \"{}\" is not known, heights are taken as metres", rules.unit);
+    raster.heights_doubted = MetresPerUnit(rules.unit)
+                                 ? DoubtsOf(*range)
+                                 : fmt::format(
+                                       "height unit \"{}\" is not known, heights are taken as metres: state metres a "
+                                       "unit with `gdal_translate -a_scale FACTOR in out`",
+                                       rules.unit);
     return std::move(raster);
   };
   if (!options.find_voids) return finish();

@@ -211,7 +211,9 @@ asio::awaitable<bool> Session::ServeOne() {
   request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
   Admission& admission = exchange_.admission;
-  admission = handler_->Admit(request, context_->request_time_limit->load(std::memory_order_relaxed));
+  // A turn that comes later would leave too little time for the answer.
+  const auto longest_wait = context_->request_time_limit->load(std::memory_order_relaxed) / 2;
+  admission = handler_->Admit(request, longest_wait);
   exchange_.has_valid_head = true;
   if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
   if (admission.delays_refusal) {

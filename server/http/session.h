@@ -4,8 +4,8 @@
 // with a body of at most the size that its admission allows, and one reply. Bodies and replies larger than
 // TransferBudget::kFreeBytes count against a budget that all sessions share. If it has no memory, they wait until the
 // request's deadline, and are then refused; an upload is refused earlier if others get its memory. A request over its
-// client's rate waits for its turn; if the turn would come after its deadline, it is refused after kRefusalDelay
-// (http_error.h). All these waits and the answer itself share one deadline.
+// client's rate waits for its turn; if the turn would come after half of the time to its deadline, it is refused after
+// kRefusalDelay (http_error.h). All these waits and the answer itself share one deadline.
 #pragma once
 
 #include <atomic>

@@ -56,6 +56,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     const std::lock_guard lock(mutex_);
     if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
     const JobClock::time_point now = now_();
+    if (job->terms.deadline <= now) return MakeError(ErrorCode::kCancelled, "the request's deadline has passed");
     // Compared in seconds, because a deadline may be time_point::max().
     if (queue_.ExpectedWait(job->terms, now) > std::chrono::duration<double>(job->terms.deadline - now)) {
       return MakeError(ErrorCode::kOverloaded, "too many jobs are waiting: this job cannot start before its deadline");

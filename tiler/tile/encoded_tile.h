@@ -1,4 +1,5 @@
-// An encoded tile, or the file of an area mesh. Immutable, and shared by the cache and all responses that send it.
+// An encoded tile, or the file of an area mesh. Tiles are immutable, and shared by the cache and all responses that
+// send them.
 #pragma once
 
 #include <chrono>

@@ -219,7 +219,8 @@ int BakeJob(const PlacedBake& bake, const std::string& worker) {
   if (bake.signals.signal() != 0) return StopCode(bake.signals);
   BakeSummary summary = Summarize(reports, counters, bake.place, SecondsSince(start));
   summary.is_complete = code == kExitOk;
-  if (code == kExitUsage || (code != kExitOk && reports.empty())) return code;  // the reason was printed
+  const bool has_begun = code == kExitOk || !reports.empty();
+  if (code == kExitUsage || !(has_begun || bake.arguments.json)) return code;  // the reason was printed
   fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
   return code;
 }

@@ -77,6 +77,8 @@ class Sessions : public testing::Test {
     context_->transfers = &transfers_;
     context_->request_time_limit = &request_time_limit_;
   }
+  ~Sessions() override { End(); }  // sessions must not outlive what they use
+
   void RunUntilAnswered(std::size_t requests) {
     while (echo_.targets.size() < requests && io_.run_one_for(std::chrono::seconds(10)) > 0) {
     }

@@ -111,6 +111,8 @@ TEST(WorkerPool, RefusesOnlyWhatCannotBeginInTime) {
   EXPECT_EQ(taken, 3) << "the third would begin after 20 s, the fourth after 30";
   hasty.deadline = now() + 5s;
   EXPECT_FALSE(busy.pool.Submit(JobOf([] {}, hasty)));
+  hasty.deadline = now();
+  EXPECT_EQ(busy.pool.Submit(JobOf([] {}, hasty)).error().code, ErrorCode::kCancelled) << "not because of the queue";
   hasty.client = 2;
   hasty.deadline = now() + 15s;
   EXPECT_TRUE(busy.pool.Submit(JobOf([] {}, hasty))) << "its turn comes after one of the other's";
