@@ -78,7 +78,7 @@ std::string CardsOf(const Summary& summary) {
   const bool is_one = summary.clients.size() == 1;
   AddCard(Time(summary.worst_first_view_s),
           is_one ? "until the first full view" : "until the first full view, slowest client",
-          summary.never_full + summary.never_opened > 0, html);
+          summary.worst_first_view_s < 0, html);
   AddCard(fmt::format("{:.1f} %", 100 * summary.refined_share), "of the frames fully refined",
           summary.refined_share < 0.75, html);
   AddCard(fmt::format("{:.1f} px", summary.frame_p99_px), "worst error on screen in 99 % of the frames", false, html);

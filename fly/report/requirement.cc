@@ -57,7 +57,7 @@ double ValueOf(Measure measure, const Summary& summary) {
   const bool has_tiles = totals.tiles > 0, has_flight = totals.flying_frames > 0;
   switch (measure) {
     case Measure::kFullView:
-      return summary.never_full + summary.never_opened > 0 ? -1 : summary.worst_first_view_s;
+      return summary.worst_first_view_s;
     case Measure::kP50:
       return has_tiles ? summary.p50_s : -1;
     case Measure::kP99:

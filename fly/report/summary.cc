@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "engine/core/plain_number.h"
 
@@ -97,20 +99,23 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   summary.clients = record.clients;
   const std::vector<Second>& seconds = record.seconds;
   summary.seconds = static_cast<double>(seconds.size());
+  constexpr float kNever = std::numeric_limits<float>::infinity();  // the last in order
   std::vector<float> views;
   bool has_all_arrived = true;  // of those that opened the document
   for (const ClientRecord& client : summary.clients) {
     if (client.document_s < 0) ++summary.never_opened;
     if (client.document_s >= 0 && client.first_view_s < 0) ++summary.never_full;
-    if (client.first_view_s >= 0) views.push_back(static_cast<float>(client.first_view_s));
+    views.push_back(client.first_view_s < 0 ? kNever : static_cast<float>(client.first_view_s));
     summary.arrival_s = std::max(summary.arrival_s, client.arrival_s);
     has_all_arrived &= client.document_s < 0 || client.arrival_s >= 0;
   }
   if (!has_all_arrived) summary.arrival_s = -1;
-  if (!views.empty()) {
-    summary.first_view_s = Percentile(views, 0.5);
-    summary.worst_first_view_s = Percentile(views, 1);
-  }
+  const auto view_at = [&views](double share) {
+    const double seconds = Percentile(views, share);
+    return std::isinf(seconds) ? -1 : seconds;
+  };
+  summary.first_view_s = view_at(0.5);
+  summary.worst_first_view_s = view_at(1);
   const Totals& totals = summary.totals;
   summary.p50_s = totals.latencies_s.Percentile(0.5);
   summary.p99_s = totals.latencies_s.Percentile(0.99);

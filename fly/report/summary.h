@@ -16,7 +16,7 @@ struct Summary {
   std::vector<ClientRecord> clients;
   double seconds = 0;                                 // of the whole run
   int never_opened = 0, never_full = 0;               // clients
-  double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
+  double first_view_s = -1, worst_first_view_s = -1;  // median and worst of all clients; -1: never
   double arrival_s = -1;                      // worst; -1: a client that opened the document had none after its flight
   double p50_s = 0, p99_s = 0, max_s = 0;     // of tiles
   double tiles_per_second = 0;                // mean over the seconds in which tiles arrived, were wanted or in flight

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include "fly/report/html_report.h"
 #include "fly/report/map_plot.h"
@@ -58,6 +60,40 @@ TEST(Summary, TheWorstArrivalIsThatOfAllClients) {
   };
   EXPECT_EQ(arrival_of({0.5, 2}), 2);
   EXPECT_EQ(arrival_of({0.5, -1}), -1);
+}
+
+TEST(Summary, AClientWithoutAFullViewIsTheSlowest) {
+  const auto views_of = [](const std::vector<double>& views_s) {
+    Statistics statistics(static_cast<int>(views_s.size()));
+    for (std::size_t i = 0; i < views_s.size(); ++i) {
+      ClientRecord client;
+      client.document_s = views_s[i] == -2 ? -1 : 0.1;
+      client.first_view_s = std::max(-1.0, views_s[i]);
+      statistics.SetClient(static_cast<int>(i), client);
+    }
+    const Summary summary = Summarize(SomeOptions(), statistics.record());
+    return std::pair(summary.first_view_s, summary.worst_first_view_s);
+  };
+  EXPECT_EQ(views_of({2, 0.5, 1}), std::pair(1.0, 2.0));
+  EXPECT_EQ(views_of({0.5, -1, 1}), std::pair(1.0, -1.0));
+  EXPECT_EQ(views_of({-2, 0.5, 1}), std::pair(1.0, -1.0));  // -2: no document
+  EXPECT_EQ(views_of({-1, 0.5, -1}), std::pair(-1.0, -1.0));
+}
+
+TEST(Summary, ReportsAgreeThatAClientNeverHadAFullView) {
+  Statistics statistics(3);
+  Fill(statistics);
+  ClientRecord client;
+  client.document_s = client.first_view_s = 1.5;
+  statistics.SetClient(1, client);
+  const FlightOptions options = SomeOptions();
+  const Summary summary = Summarize(options, statistics.record());
+  const std::string json = JsonOf(options, summary, {}, {}), text = TextOf(summary),
+                    html = HtmlOf(options, summary, {}, statistics.record());
+  EXPECT_NE(json.find(R"("worst": null)"), std::string::npos) << json;
+  EXPECT_NE(json.find(R"("median": 1.5)"), std::string::npos) << json;
+  EXPECT_NE(text.find("1500 ms median, never worst of 3 clients"), std::string::npos) << text;
+  EXPECT_NE(html.find(R"(<b class="bad">never</b><span>until the first full view, slowest client)"), std::string::npos);
 }
 
 TEST(Summary, CountsWhatHappened) {
