@@ -10,6 +10,8 @@
 #include <optional>
 #include <string>
 
+#include "fly/scene/json_reason.h"
+
 namespace terrace::fly {
 namespace {
 
@@ -19,9 +21,15 @@ constexpr double kMeanRadius = 6371000;
 constexpr double kStepDegrees = 0.05;  // between the points of a great circle
 constexpr double kSamePlace = 1e-6;    // metres; rounding moves equal points apart by nanometres
 constexpr std::size_t kMaxPoints = 1'000'000;
+constexpr const char* kPointForms = "lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch";
 
 // The turn from a to b, -180 to 180.
 double Turn(double a, double b) { return std::remainder(b - a, 360.0); }
+
+// Where the surface has the normal `n`, of any length.
+GeodeticPoint PlaceOf(const geo::Vec3& n, double height_m) {
+  return {geo::ToDegrees(std::atan2(n.y, n.x)), geo::ToDegrees(std::atan2(n.z, std::hypot(n.x, n.y))), height_m};
+}
 
 double GroundMetres(const GeodeticPoint& a, const GeodeticPoint& b) {
   const geo::Vec3 u = geo::SurfaceNormal(a.longitude, a.latitude), v = geo::SurfaceNormal(b.longitude, b.latitude);
@@ -69,27 +77,37 @@ void Unwrap(FlightPath& path) {
   }
 }
 
+// Numbers with a comma or blanks between them, or none. Nothing if the line has anything else, or an empty field.
 std::optional<std::vector<double>> Numbers(std::string_view line) {
   std::vector<double> numbers;
   const char* at = line.data();
   const char* const end = at + line.size();
+  const auto skip_blanks = [&at, end] {
+    while (at < end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
+  };
+  skip_blanks();
+  if (at == end) return numbers;
   for (;;) {
-    while (at < end && (*at == ' ' || *at == ',' || *at == '\t' || *at == '\r')) ++at;
-    if (at == end) return numbers;
     double value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
+    const char* const begin = at;
+    const auto [next, error] = std::from_chars(begin, end, value);
     if (error != std::errc() || !std::isfinite(value)) return std::nullopt;
     numbers.push_back(value);
     at = next;
+    skip_blanks();
+    if (at == end) return numbers;
+    if (*at == ',') {
+      ++at;
+      skip_blanks();
+    } else if (at == next) {
+      return std::nullopt;
+    }
   }
 }
 
 Result<void> AddPoint(const std::vector<double>& n, std::string_view where, FlightPath& path) {
   if (n.size() != 3 && n.size() != 5 && n.size() != 6) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: {} numbers; a point is lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch", where,
-        n.size());
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers; write {}", where, n.size(), kPointForms);
   }
   const std::size_t first = n.size() == 6 ? 1 : 0;
   FlightPath::Point point;
@@ -117,12 +135,19 @@ Result<void> AddPoint(const std::vector<double>& n, std::string_view where, Flig
   return {};
 }
 
+// The first LineString of a GeoJSON object or a list of them. Other members, such as properties, are not searched.
 const Json* FindLine(const Json& json) {
-  if (json.is_object() && json.value("type", "") == "LineString") return &json;
-  if (!json.is_structured()) return nullptr;
-  for (const Json& part : json) {
-    if (!part.is_structured()) continue;
-    if (const Json* line = FindLine(part)) return line;
+  if (json.is_array()) {
+    for (const Json& part : json) {
+      if (const Json* line = FindLine(part)) return line;
+    }
+  }
+  if (!json.is_object()) return nullptr;
+  if (const auto type = json.find("type"); type != json.end() && *type == "LineString") return &json;
+  for (const char* member : {"features", "geometry", "geometries"}) {
+    const auto part = json.find(member);
+    if (part == json.end()) continue;
+    if (const Json* line = FindLine(*part)) return line;
   }
   return nullptr;
 }
@@ -143,7 +168,7 @@ Result<std::size_t> ReadGeoJson(std::string_view text, FlightPath& path) {
     }
     return 3;
   } catch (const std::exception& error) {
-    return MakeError(ErrorCode::kInvalidArgument, "the GeoJSON cannot be read: {}", error.what());
+    return MakeError(ErrorCode::kInvalidArgument, "the GeoJSON cannot be read: {}", JsonReason(error));
   }
 }
 
@@ -156,7 +181,10 @@ Result<std::size_t> ReadLines(std::string_view text, FlightPath& path) {
     text.remove_prefix(std::min(end + 1, text.size()));
     const std::optional<std::vector<double>> numbers = Numbers(line.substr(0, line.find('#')));
     const std::string where = fmt::format("line {}", number);
-    if (!numbers) return MakeError(ErrorCode::kInvalidArgument, "{}: not only numbers", where);
+    if (!numbers)
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: has something other than numbers with commas or blanks between them; write {}", where,
+                       kPointForms);
     if (numbers->empty()) continue;
     if (columns != 0 && numbers->size() != columns) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where,
@@ -224,9 +252,7 @@ FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, 
     const double fraction = static_cast<double>(i) / steps;
     GeodeticPoint point = i == 0 ? from : to;
     if (i > 0 && i < steps) {
-      const geo::Vec3 n = u * std::sin((1 - fraction) * angle) + v * std::sin(fraction * angle);
-      point.longitude = geo::ToDegrees(std::atan2(n.y, n.x));
-      point.latitude = geo::ToDegrees(std::atan2(n.z, std::hypot(n.x, n.y)));
+      point = PlaceOf(u * std::sin((1 - fraction) * angle) + v * std::sin(fraction * angle), 0);
     }
     point.height_m = from.height_m + (to.height_m - from.height_m) * fraction;
     path.points.push_back({0, {point, 0, 0}});
@@ -241,14 +267,16 @@ FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const Flight
   FlightPath path;
   path.is_closed = true;
   const double angle = radius_m / kMeanRadius;
+  // Vectors have no singularity at the poles.
   const double lat = geo::ToRadians(center.latitude), lon = geo::ToRadians(center.longitude);
+  const geo::Vec3 up = geo::SurfaceNormal(center.longitude, center.latitude);
+  const geo::Vec3 north{-std::sin(lat) * std::cos(lon), -std::sin(lat) * std::sin(lon), std::cos(lat)};
+  const geo::Vec3 east{-std::sin(lon), std::cos(lon), 0};
   constexpr int kSteps = 360;
   for (int i = 0; i <= kSteps; ++i) {
     const double bearing = geo::ToRadians(i * 360.0 / kSteps);
-    const double to = std::asin(std::sin(lat) * std::cos(angle) + std::cos(lat) * std::sin(angle) * std::cos(bearing));
-    const double east =
-        std::atan2(std::sin(bearing) * std::sin(angle) * std::cos(lat), std::cos(angle) - std::sin(lat) * std::sin(to));
-    path.points.push_back({0, {{geo::ToDegrees(lon + east), geo::ToDegrees(to), center.height_m}, 0, 0}});
+    const geo::Vec3 away = north * std::cos(bearing) + east * std::sin(bearing);
+    path.points.push_back({0, {PlaceOf(up * std::cos(angle) + away * std::sin(angle), center.height_m), 0, 0}});
   }
   Unwrap(path);
   SetTimesAndHeadings(speed, path);

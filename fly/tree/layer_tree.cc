@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "fly/tree/json_reason.h"
+#include "fly/scene/json_reason.h"
 #include "fly/tree/tile_tree.h"
 
 namespace terrace::fly {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "engine/core/bytes.h"
-#include "fly/tree/json_reason.h"
+#include "fly/scene/json_reason.h"
 
 namespace terrace::fly {
 namespace {

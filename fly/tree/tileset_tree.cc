@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "fly/tree/json_reason.h"
+#include "fly/scene/json_reason.h"
 #include "fly/tree/subtree.h"
 #include "fly/tree/tile_tree.h"
 

@@ -45,6 +45,21 @@ TEST(FlightPath, CirclesAtItsRadius) {
   EXPECT_NEAR(path.PoseAt(0.01).heading, 90, 1.5);
 }
 
+TEST(FlightPath, CirclesAroundAPoleAndThroughIt) {
+  constexpr double kRadius = 100'000, kMeanRadius = 6371000;
+  for (const double latitude : {90.0, -90.0, 89.999999, 89.5, -89.1}) {
+    const FlightPath path = MakeCircle({25, latitude, 4000}, kRadius, kSpeed);
+    EXPECT_NEAR(path.length_m(), 2 * 3.14159265 * kRadius, 250) << latitude;
+    const geo::Vec3 center = geo::SurfaceNormal(25, latitude);
+    for (const FlightPath::Point& point : path.points) {
+      const GeodeticPoint& p = point.pose.position;
+      const geo::Vec3 normal = geo::SurfaceNormal(p.longitude, p.latitude);
+      EXPECT_NEAR(kMeanRadius * std::atan2(geo::Length(geo::Cross(center, normal)), geo::Dot(center, normal)), kRadius,
+                  0.01);
+    }
+  }
+}
+
 TEST(FlightPath, RestsAtOnePlace) {
   const FlightPath path = MakeStraightPath({7, 46, 3000}, {7, 46, 3000}, kSpeed);
   EXPECT_EQ(path.duration_s(), 0);
@@ -65,6 +80,21 @@ TEST(FlightPath, ReadsLinesAndGeoJson) {
       R"({"type":"Feature","geometry":{"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]}})", kSpeed);
   ASSERT_TRUE(json) << json.error().message;
   EXPECT_DOUBLE_EQ(json->length_m(), line->length_m());
+}
+
+TEST(FlightPath, FindsTheLineStringOfAGeometry) {
+  const std::string line = R"({"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]})";
+  const std::string other = R"({"type":"LineString","coordinates":[[1,1,1]]})";
+  for (const std::string& text :
+       {R"({"type":"Feature","properties":{"type":7,"way":)" + other + R"(},"geometry":)" + line + "}",
+        R"({"type":"FeatureCollection","crs":{"type":null},"features":[{"type":"Feature","geometry":null},)"
+        R"({"type":"Feature","geometry":)" +
+            line + "}]}",
+        R"({"type":"GeometryCollection","geometries":[{"type":"Point","coordinates":[1,2,3]},)" + line + "]}"}) {
+    const Result<FlightPath> path = ParsePath(text, kSpeed);
+    ASSERT_TRUE(path) << text << path.error().message;
+    EXPECT_EQ(path->points.size(), 2U) << text;
+  }
 }
 
 TEST(FlightPath, LooksAlongThePathWherePointsAreRepeated) {
@@ -121,6 +151,14 @@ TEST(FlightPath, NamesTheLineThatIsWrong) {
   EXPECT_NE(message("nan,46,1").find("line 1"), std::string::npos);
   EXPECT_NE(message("7,46,1,1e9,0").find("line 1: heading"), std::string::npos);
   EXPECT_NE(message("7,46,1,0,-91").find("line 1: heading"), std::string::npos);
+  for (const char* text :
+       {"-84.2,36.3,1\n-84.2,36.3-0.1", "7,46,1\n,,", "7,46,1\n7,,46,1", "7,46,1\n7,46,1,", "7,46,1\n,7,46,1"}) {
+    EXPECT_NE(message(text).find("line 2: has something other than numbers with commas or blanks between them; write "
+                                 "lon,lat,height"),
+              std::string::npos)
+        << message(text);
+  }
+  EXPECT_EQ(message(R"({"type":"LineString"})"), "the GeoJSON cannot be read: key 'coordinates' not found");
   EXPECT_NE(message("").find("no points"), std::string::npos);
   EXPECT_NE(message(R"({"type":"Point"})").find("no LineString"), std::string::npos);
   EXPECT_NE(message(R"({"type":"LineString","coordinates":[]})").find("no points"), std::string::npos);
