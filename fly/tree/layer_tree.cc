@@ -62,6 +62,11 @@ Result<Layer> ParseLayer(std::string_view text) {
                        "this is no layer.json: it has no \"tiles\"; give the URL of a layer.json, or fly over a "
                        "tileset with --format 3dtiles");
     }
+    if (json.contains("tilejson") && !json.contains("available") &&
+        !json.value("format", "").starts_with("quantized-mesh")) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "this is the TileJSON of a map; give the URL of a layer.json or tileset.json");
+    }
     if (json.value("projection", "EPSG:4326") != "EPSG:4326") {
       return MakeError(ErrorCode::kInvalidArgument,
                        "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
@@ -97,7 +102,14 @@ class LayerTree : public TileTree {
     root_.always_refine = true;
     root_.state = LoadState::kReady;
     root_.volume = Region({-180, -90, 180, 90}, kLowestGround, kHighestGround);
-    for (std::int64_t x = 0; x < 2; ++x) AddTile(root_, {0, x, 0}, true, {kLowestGround, kHighestGround}, kRootError);
+    for (std::int64_t x = 0; x < 2; ++x) {
+      const geo::TileKey key{0, x, 0};
+      AddTile(root_, key, true, {kLowestGround, kHighestGround}, kRootError);
+      if (IsAvailable(key)) continue;
+      // cesium-native makes the tile too, and does not request it.
+      root_.children.back()->content = Content::kEmpty;
+      root_.children.back()->state = LoadState::kReady;
+    }
   }
 
   // Adds all four children or none. The client upsamples the parent where the server has no child.

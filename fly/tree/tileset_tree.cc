@@ -1,4 +1,5 @@
 // The tree of a tileset.json: explicit tiles, and below them implicit quadtrees that grow with their subtrees.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -219,11 +220,15 @@ class TilesetTree : public TileTree {
     return uri;
   }
 
-  // URLs contain the version of the first document: replaces it by the current one.
+  // Where a parameter of the query is the version of the first document, replaces it by the current one.
   std::string WithVersion(std::string uri) const {
     if (first_version_.empty() || first_version_ == version_) return uri;
-    const std::size_t at = uri.find(first_version_);
-    if (at != std::string::npos) uri.replace(at, first_version_.size(), version_);
+    for (std::size_t at = uri.find('?'); at != std::string::npos; at = uri.find('&', at + 1)) {
+      const std::size_t value = uri.find('=', at) + 1, end = std::min(uri.find('&', at + 1), uri.size());
+      if (value > at && value <= end && uri.compare(value, end - value, first_version_) == 0) {
+        uri.replace(value, end - value, version_);
+      }
+    }
     return uri;
   }
 

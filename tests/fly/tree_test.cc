@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 
 #include "fly/tree/subtree.h"
 #include "fly/tree/tile_tree.h"
@@ -54,11 +55,29 @@ TEST(LayerTree, FindsTilesInManyRanges) {
   for (const auto& child : parent.children) EXPECT_EQ(child->content, Content::kMesh);
 }
 
+TEST(LayerTree, RequestsNoRootThatIsNotAvailable) {
+  const auto tree = MakeLayerTree(R"({"tiles":["{z}/{x}/{y}"],"available":[
+    [{"startX":0,"startY":0,"endX":0,"endY":0}],[{"startX":2,"startY":1,"endX":2,"endY":1}]]})");
+  ASSERT_TRUE(tree);
+  Tile& west = *(*tree)->root().children[0];
+  Tile& east = *(*tree)->root().children[1];
+  EXPECT_EQ((*tree)->RequestFor(west).kind, NextRequest::Kind::kMesh);
+  EXPECT_TRUE(west.NeedsLoad());
+  EXPECT_EQ((*tree)->RequestFor(east).kind, NextRequest::Kind::kNothing);
+  EXPECT_FALSE(east.NeedsLoad());
+  (*tree)->AddChildren(east);
+  EXPECT_EQ(east.children.size(), 4U);
+}
+
 TEST(LayerTree, SaysWhatItCannotRead) {
   const auto message = [](std::string_view text) { return MakeLayerTree(text).error().message; };
   EXPECT_NE(message("<html>").find("layer.json cannot be read"), std::string::npos);
   EXPECT_NE(message(R"({"tiles":["x"]})").find("no \"available\""), std::string::npos);
   EXPECT_NE(message(R"({"projection":"EPSG:3857","tiles":["x"],"available":[]})").find("EPSG:3857"), std::string::npos);
+  EXPECT_EQ(message(R"({"tilejson":"3.0.0","format":"png","tiles":["x"]})"),
+            "this is the TileJSON of a map; give the URL of a layer.json or tileset.json");
+  EXPECT_NE(message(R"({"tilejson":"2.1.0","format":"quantized-mesh-1.0","tiles":["x"]})").find("no \"available\""),
+            std::string::npos);
   for (const std::string_view other : {std::string_view(kTileset), std::string_view("[1]"), std::string_view("{}")}) {
     EXPECT_EQ(message(other),
               "this is no layer.json: it has no \"tiles\"; give the URL of a layer.json, or fly over a tileset with "
@@ -140,6 +159,23 @@ TEST(TilesetTree, FollowsTheVersionOfItsDocument) {
   ASSERT_TRUE((*made)->TakeDocument(later));
   EXPECT_EQ((*made)->version(), "bbbb");
   EXPECT_EQ((*made)->RequestFor(*(*made)->root().children[0]->children[0]->children[0]).uri, "t/0.0.0.subtree?v=bbbb");
+}
+
+TEST(TilesetTree, ReplacesTheVersionInTheQueryAlone) {
+  const std::string tileset = kTileset;
+  const auto with = [&tileset](const std::string& version, const std::string& uri) {
+    std::string text = tileset;
+    text.replace(text.find("t/{level}.{x}.{y}.subtree?v=aaaa"), 32, uri);
+    return text.replace(text.find("aaaa"), 4, version);
+  };
+  for (const auto& [before, after] : {std::pair("v2/2.subtree?v=2", "v2/2.subtree?v=5"),
+                                      std::pair("2.subtree?error=12&v=2&w=20", "2.subtree?error=12&v=5&w=20"),
+                                      std::pair("2/2.subtree", "2/2.subtree")}) {
+    auto made = MakeTilesetTree(with("2", before));
+    ASSERT_TRUE(made) << made.error().message;
+    ASSERT_TRUE((*made)->TakeDocument(with("5", before)));
+    EXPECT_EQ((*made)->RequestFor(*(*made)->root().children[0]->children[0]->children[0]).uri, after);
+  }
 }
 
 TEST(TilesetTree, SaysWhatItCannotRead) {
