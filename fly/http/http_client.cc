@@ -7,6 +7,8 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -15,7 +17,7 @@
 #include <cstddef>
 #include <exception>
 #include <map>
-#include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -76,6 +78,7 @@ class HttpClient::Impl {
         tls_(asio::ssl::context::tls_client),
         work_(io_.get_executor()),
         idle_(static_cast<std::size_t>(options.clients)) {
+    for (int i = 0; i < options.clients; ++i) strands_.push_back(asio::make_strand(io_));
     tls_.set_default_verify_paths();
     tls_.set_verify_mode(options.verifies_certificates ? asio::ssl::verify_peer : asio::ssl::verify_none);
     for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { io_.run(); });
@@ -86,9 +89,13 @@ class HttpClient::Impl {
     threads_.clear();  // joins; only then may the coroutines be destroyed
   }
 
-  void Start(std::shared_ptr<Call> call) { asio::co_spawn(io_, Run(std::move(call)), asio::detached); }
+  void Start(std::shared_ptr<Call> call) {
+    const Strand& strand = strands_[static_cast<std::size_t>(call->client)];
+    asio::co_spawn(strand, Run(std::move(call)), asio::detached);
+  }
 
  private:
+  using Strand = asio::strand<asio::io_context::executor_type>;
   using Idle = std::map<Origin, std::vector<std::unique_ptr<Connection>>>;
 
   std::chrono::nanoseconds timeout() const {
@@ -96,7 +103,6 @@ class HttpClient::Impl {
   }
 
   std::unique_ptr<Connection> TakeIdle(int client, const Origin& origin) {
-    const std::lock_guard lock(mutex_);
     auto& connections = idle_[static_cast<std::size_t>(client)][origin];
     if (connections.empty()) return nullptr;
     std::unique_ptr<Connection> connection = std::move(connections.back());
@@ -105,13 +111,13 @@ class HttpClient::Impl {
   }
 
   void PutIdle(int client, const Origin& origin, std::unique_ptr<Connection> connection) {
-    const std::lock_guard lock(mutex_);
     idle_[static_cast<std::size_t>(client)][origin].push_back(std::move(connection));
   }
 
   // Null if there is no connection; then `reply` says why.
   asio::awaitable<std::unique_ptr<Connection>> Open(Origin origin, HttpReply& reply) {
-    asio::ip::tcp::resolver resolver(io_);
+    const asio::any_io_executor strand = co_await asio::this_coro::executor;
+    asio::ip::tcp::resolver resolver(strand);
     auto [resolve_error, endpoints] = co_await resolver.async_resolve(origin.host, origin.port, kAwait);
     if (resolve_error) {
       Fail(reply, Failure::kConnect, resolve_error);
@@ -119,9 +125,9 @@ class HttpClient::Impl {
     }
     auto connection = std::make_unique<Connection>();
     if (origin.is_tls) {
-      connection->tls = std::make_unique<TlsStream>(io_, tls_);
+      connection->tls = std::make_unique<TlsStream>(strand, tls_);
     } else {
-      connection->plain = std::make_unique<beast::tcp_stream>(io_);
+      connection->plain = std::make_unique<beast::tcp_stream>(strand);
     }
     connection->lowest().expires_after(timeout());
     auto [connect_error, endpoint] = co_await connection->lowest().async_connect(endpoints, kAwait);
@@ -240,11 +246,13 @@ class HttpClient::Impl {
 
   const HttpOptions options_;
   asio::ssl::context tls_;
-  std::mutex mutex_;  // guards idle_
   // Declared before the members that use it: connections and coroutines are destroyed first.
   asio::io_context io_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
-  std::vector<Idle> idle_;  // by client
+  // By client. Its coroutines and the timers of its streams run on its strand: they would race otherwise, and a timeout
+  // would look like a cut. Only they use its idle connections.
+  std::vector<Strand> strands_;
+  std::vector<Idle> idle_;
   std::vector<std::jthread> threads_;
 };
 
