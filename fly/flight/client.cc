@@ -228,6 +228,7 @@ void Client::TakeTile(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
   tile_bytes_ -= tile.decoded_bytes;
   tree_->TakeContent(tile, decoded.content);
+  statistics_.SetClient(number_, record_);
   tile.decoded_bytes = decoded.content.bytes;
   tile_bytes_ += tile.decoded_bytes;
   tile.version = decoded.version;
@@ -305,7 +306,7 @@ void Client::StartLoad(Tile& tile) {
   }
   const NextRequest request = tree_->RequestFor(tile);
   if (request.kind == NextRequest::Kind::kNothing) {
-    tile.state = LoadState::kReady;
+    tile.state = tile.parent->state;  // a quarter of a tile that has failed is a hole too
     return;
   }
   SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request.uri);
@@ -338,14 +339,18 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   record.is_refined = selection.IsRefined();
   record.drawn = selection.drawn.size();
   record.wanted = selection.loads.size() + selection.pending;
-  record.is_loaded = record.is_refined && record.wanted == 0;
+  record.is_loaded = record.is_settled && record.wanted == 0;
   record.in_flight = static_cast<std::size_t>(active_);
   std::uint32_t version = 0;
+  record.is_settled = selection.IsSettled();
   for (const DrawnTile& drawn : selection.drawn) {
     const Tile& tile = *drawn.tile;
     const bool can_refine = !tile.children.empty() || tile.children_unknown;
     if (can_refine) record.worst_px = std::clamp(drawn.error_px, record.worst_px, kWorstPixels);
-    if (tile.children_unknown && drawn.error_px >= options_.select.max_error_px) record.is_refined = false;
+    if (tile.children_unknown && drawn.error_px >= options_.select.max_error_px) {
+      record.is_refined = false;
+      record.is_settled &= tile.state == LoadState::kFailed;
+    }
     const Tile& loaded = tile.content == Content::kUpsampled ? *tile.parent : tile;
     if (tile.state != LoadState::kReady || loaded.version == 0) continue;
     if (loaded.stated_error_m >= 0) {
@@ -377,7 +382,8 @@ void Client::Advance(const FrameRecord& record, double now_s) {
 void Client::AdvancePhase(const FrameRecord& record, double now_s) {
   // A view that comes later than the take-off still counts as one.
   if (record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
-  if (phase_ == Phase::kFirstView && (record.is_refined || now_s - start_s_ > options_.first_view_limit_s)) {
+  // A tile that has failed does not hold up the flight.
+  if (phase_ == Phase::kFirstView && (record.is_settled || now_s - start_s_ > options_.first_view_limit_s)) {
     phase_ = Phase::kFlying;
     takeoff_s_ = now_s;
   }

@@ -63,8 +63,9 @@ struct RequestRecord {
 struct FrameRecord {
   Phase phase = Phase::kFlying;
   bool is_refined = false;
-  bool is_loaded = false;  // refined, and nothing is left to load ahead
-  bool is_mixed = false;   // shows tiles of more than one version
+  bool is_settled = false;  // refined but for tiles that have failed
+  bool is_loaded = false;   // settled, and nothing is left to load ahead
+  bool is_mixed = false;    // shows tiles of more than one version
   bool is_late = false;
   double worst_px = 0;         // of the geometric errors of drawn tiles that can be refined
   double worst_stated_px = 0;  // of the errors that the server stated

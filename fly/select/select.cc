@@ -16,6 +16,12 @@ Verdict PreviousVerdict(const Tile& tile, std::uint64_t frame) {
 bool Selection::IsRefined() const {
   if (any_kicked || drawn.empty()) return false;
   return std::all_of(drawn.begin(), drawn.end(),
+                     [](const DrawnTile& drawn_tile) { return drawn_tile.tile->state == LoadState::kReady; });
+}
+
+bool Selection::IsSettled() const {
+  if (any_kicked || drawn.empty()) return false;
+  return std::all_of(drawn.begin(), drawn.end(),
                      [](const DrawnTile& drawn_tile) { return drawn_tile.tile->state != LoadState::kUnloaded; });
 }
 

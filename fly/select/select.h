@@ -48,6 +48,8 @@ struct Selection {
 
   // Whether the picture is complete: nothing was kicked, and everything drawn is loaded.
   bool IsRefined() const;
+  // Whether nothing in the picture waits for a tile: it is complete but for tiles that have failed.
+  bool IsSettled() const;
 };
 
 // Selects from `root` and its descendants, and records the verdicts in them. `frame` increases by one from call to

@@ -192,5 +192,16 @@ TEST(Select, AFailedTileDoesNotHoldUpItsSiblings) {
   EXPECT_GT(client.selection().drawn.size(), 4U);
 }
 
+TEST(Select, ATileThatHasFailedIsMissingAndNotWaitedFor) {
+  Client client(FullTree(13), {}, 1);
+  const Pose pose = Over(7, 9000, 0);
+  client.LoadAll(pose);
+  ASSERT_TRUE(client.selection().IsRefined());
+  client.selection().drawn.back().tile->state = LoadState::kFailed;
+  client.Frame(pose, 1);
+  EXPECT_FALSE(client.selection().IsRefined());
+  EXPECT_TRUE(client.selection().IsSettled());
+}
+
 }  // namespace
 }  // namespace terrace::fly
