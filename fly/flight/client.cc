@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "fly/content/glb.h"
 #include "fly/content/gunzip.h"
 #include "fly/content/quantized_mesh.h"
+#include "fly/http/retry_after.h"
 
 namespace terrace::fly {
 namespace {
@@ -55,10 +58,13 @@ std::string DetailOf(const std::string& body) {
   return is_line && text.size() <= kMaxDetailBytes ? text : std::string();
 }
 
-std::string Explain(const HttpReply& reply, Outcome outcome) {
+std::string Explain(const HttpReply& reply, Outcome outcome, bool is_document) {
   if (reply.failure != Failure::kNone) return fmt::format("{}: {}", NameOf(outcome), reply.detail);
   std::string text = fmt::format("status {}", reply.status);
   if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
+  if (is_document && reply.status / 100 == 3 && !reply.location.empty()) {
+    text += fmt::format(": it moved to {}; give this URL", reply.location);
+  }
   if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
   return text;
 }
@@ -106,7 +112,7 @@ void Client::Decode(Format format, DecodedReply& decoded) {
     }
   }
   if (decoded.outcome != Outcome::kOk) {
-    decoded.message = Explain(decoded.reply, decoded.outcome);
+    decoded.message = Explain(decoded.reply, decoded.outcome, decoded.resource == Resource::kDocument);
     return;
   }
   if (decoded.resource != Resource::kTile) {
@@ -222,13 +228,13 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
   version_ = 1;
   record_.document_s = now_s - start_s_;
   phase_ = Phase::kFirstView;
+  statistics_.SetClient(number_, record_);
 }
 
 void Client::TakeTile(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
   tile_bytes_ -= tile.decoded_bytes;
   tree_->TakeContent(tile, decoded.content);
-  statistics_.SetClient(number_, record_);
   tile.decoded_bytes = decoded.content.bytes;
   tile_bytes_ += tile.decoded_bytes;
   tile.version = decoded.version;
@@ -267,11 +273,10 @@ bool Client::AsksAgain(const DecodedReply& decoded, Attempts& attempts) const {
 
 double Client::PauseFor(const DecodedReply& decoded, const Attempts& attempts) const {
   const double pause_s = std::min(kLongestPause, kFirstPause * std::exp2(std::min(attempts.all, 10) - 1));
-  const std::string& text = decoded.reply.retry_after;
-  double stated = -1;
-  std::from_chars(text.data(), text.data() + text.size(), stated);
+  const std::optional<double> stated =
+      RetryAfterSeconds(decoded.reply.retry_after, decoded.reply.date, std::chrono::system_clock::now());
   const std::uint64_t seed = static_cast<std::uint64_t>(number_) * 1000 + waiting_.size();
-  if (stated >= 0) return stated + (Spread(seed) - 0.75);  // never sooner than asked
+  if (stated) return *stated + (Spread(seed) - 0.75);  // never sooner than asked
   return pause_s * Spread(seed);
 }
 
@@ -301,12 +306,12 @@ void Client::StartLoad(Tile& tile) {
   if (!tile.NeedsLoad()) return;
   if (tile.content == Content::kUpsampled) {
     if (tile.parent->state == LoadState::kUnloaded) return StartLoad(*tile.parent);
-    tile.state = LoadState::kReady;
+    tile.state = tile.parent->state;  // a quarter of a tile that has failed is a hole too
     return;
   }
   const NextRequest request = tree_->RequestFor(tile);
   if (request.kind == NextRequest::Kind::kNothing) {
-    tile.state = tile.parent->state;  // a quarter of a tile that has failed is a hole too
+    tile.state = LoadState::kReady;
     return;
   }
   SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request.uri);
@@ -337,12 +342,12 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   FrameRecord record;
   record.phase = phase_;
   record.is_refined = selection.IsRefined();
+  record.is_settled = selection.IsSettled();
   record.drawn = selection.drawn.size();
   record.wanted = selection.loads.size() + selection.pending;
   record.is_loaded = record.is_settled && record.wanted == 0;
   record.in_flight = static_cast<std::size_t>(active_);
   std::uint32_t version = 0;
-  record.is_settled = selection.IsSettled();
   for (const DrawnTile& drawn : selection.drawn) {
     const Tile& tile = *drawn.tile;
     const bool can_refine = !tile.children.empty() || tile.children_unknown;

@@ -63,10 +63,10 @@ void Fail(HttpReply& reply, Failure failure, const error_code& error) {
   reply.detail = error.message();
 }
 
-bool IsUntrusted(const error_code& error) {
+bool IsTlsError(const error_code& error, int reason) {
   const auto code = static_cast<unsigned long>(error.value());
   return error.category() == asio::error::get_ssl_category() && ERR_GET_LIB(code) == ERR_LIB_SSL &&
-         ERR_GET_REASON(code) == SSL_R_CERTIFICATE_VERIFY_FAILED;
+         ERR_GET_REASON(code) == reason;
 }
 
 }  // namespace
@@ -144,13 +144,17 @@ class HttpClient::Impl {
       }
       auto [tls_error] = co_await connection->tls->async_handshake(asio::ssl::stream_base::client, kAwait);
       if (tls_error) {
-        if (IsUntrusted(tls_error)) {
+        if (IsTlsError(tls_error, SSL_R_CERTIFICATE_VERIFY_FAILED)) {
           Fail(reply, Failure::kUntrusted, tls_error);
           reply.detail +=
               "; if the host is right, let SSL_CERT_FILE name a file with its certificate, or accept every certificate "
               "with --insecure";
         } else {
           Fail(reply, Failure::kConnect, tls_error);
+          // OpenSSL takes the first bytes of "HTTP/1.1 400" for a version.
+          if (IsTlsError(tls_error, SSL_R_WRONG_VERSION_NUMBER)) {
+            reply.detail += "; if the server speaks plain HTTP on this port, use http://";
+          }
         }
         co_return nullptr;
       }
@@ -166,11 +170,8 @@ class HttpClient::Impl {
     request.set(http::field::user_agent, "terrace-fly");
     request.set(http::field::accept, call.accept);
     request.set(http::field::accept_encoding, "gzip");
-    for (const std::string& header : options_.headers) {
-      const std::size_t colon = header.find(':');
-      const std::size_t value = header.find_first_not_of(' ', colon + 1);
-      request.set(header.substr(0, colon), value == std::string::npos ? "" : header.substr(value));
-    }
+    for (const auto& header : options_.headers) request.erase(header.first);
+    for (const auto& header : options_.headers) request.insert(header.first, header.second);
     return request;
   }
 
@@ -185,20 +186,29 @@ class HttpClient::Impl {
       Fail(reply, FailureOf(write_error), write_error);
       co_return false;
     }
-    http::response_parser<http::string_body> parser;
-    parser.body_limit(kMaxReplyBytes);
-    auto [read_error, read] = co_await http::async_read(stream, connection.buffer, parser, kAwait);
-    answered = parser.got_some();
-    reply.bytes = read;
-    if (read_error) {
-      Fail(reply, FailureOf(read_error), read_error);
-      co_return false;
-    }
-    auto& message = parser.get();
-    reply.status = static_cast<int>(message.result_int());
+    std::optional<http::response_parser<http::string_body>> parser;
+    // Any number of informational replies, such as 103 Early Hints, precede the final one (RFC 9110, 15.2). 101 is
+    // final.
+    do {
+      parser.emplace();
+      parser->body_limit(kMaxReplyBytes);
+      auto [read_error, read] = co_await http::async_read(stream, connection.buffer, *parser, kAwait);
+      answered |= parser->got_some();
+      reply.bytes += read;
+      if (read_error) {
+        Fail(reply, FailureOf(read_error), read_error);
+        co_return false;
+      }
+      reply.status = static_cast<int>(parser->get().result_int());
+    } while (reply.status / 100 == 1 && reply.status != 101);
+    auto& message = parser->get();
     reply.is_gzip = message[http::field::content_encoding] == "gzip";
     reply.server_timing = std::string(message["Server-Timing"]);
     reply.retry_after = std::string(message[http::field::retry_after]);
+    reply.date = std::string(message[http::field::date]);
+    if (const std::string to(message[http::field::location]); !to.empty()) {
+      if (const Result<Url> url = Resolve(call.url, to)) reply.location = url->Text();
+    }
     reply.cache_control = std::string(message[http::field::cache_control]);
     reply.max_error = std::string(message["Terrain-Max-Error"]);
     const bool keeps = message.keep_alive();

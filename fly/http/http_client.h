@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fly/http/url.h"
@@ -13,9 +14,10 @@ namespace terrace::fly {
 
 struct HttpOptions {
   int threads = 1;
-  int clients = 1;                   // each has connections of its own
-  double timeout_s = 30;             // of connecting to a resolved host, and of a request with its reply
-  std::vector<std::string> headers;  // "Name: value", added to each request
+  int clients = 1;        // each has connections of its own
+  double timeout_s = 30;  // of connecting to a resolved host, and of a request with its reply
+  // Names and values, in each request. A name replaces a header of the client; repeated names are all sent.
+  std::vector<std::pair<std::string, std::string>> headers;
   bool verifies_certificates = true;
 };
 
@@ -35,7 +37,8 @@ struct HttpReply {
   int status = 0;
   std::string body;  // as it was sent; see `is_gzip`
   bool is_gzip = false;
-  std::string server_timing, retry_after, cache_control, max_error;
+  std::string server_timing, retry_after, date, cache_control, max_error;
+  std::string location;     // of a redirect, as an absolute URL
   std::uint64_t bytes = 0;  // of head and body
   double seconds = 0;       // from the call of Get to the last byte, connecting included
   bool opened_connection = false;

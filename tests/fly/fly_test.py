@@ -2,53 +2,21 @@
 import gzip
 import hashlib
 import json
-import os
 import pathlib
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 import threading
 import time
 import unittest
 import urllib.request
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
-SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
-sys.path.insert(0, str(SOURCE_DIR / "tests/fly"))
-import fault_proxy  # noqa: E402
+import fault_proxy
+import flights
+from flights import BINARY, DEM, WAY, Configured, fly, fly_to, fly_with_fault
 
-DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
-WAY = ["--from", "-84.25,36.25,2500", "--to", "-84.25,36.35,2500", "--speed", "400"]
-
-
-def setUpModule():
-    global SERVER, UPSTREAM
-    SERVER = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--log-level", "error"], stdout=subprocess.PIPE, text=True)
-    UPSTREAM = re.search(r"http://([\d.:]+)/", SERVER.stdout.readline())[1]
-    urllib.request.urlopen(f"http://{UPSTREAM}/jacksboro/layer.json", timeout=60).read()
-
-
-def tearDownModule():
-    SERVER.terminate()
-    SERVER.stdout.close()
-    SERVER.wait(60)
-
-
-def fly(address, *options, path="jacksboro", way=WAY, duration="2"):
-    """(exit status, report)"""
-    done = subprocess.run([BINARY, "fly", f"http://{address}/{path}", *way, "--duration", duration, "--json", *options],
-                          capture_output=True, text=True, timeout=120, check=False)
-    if not done.stdout:
-        return done.returncode, done.stderr
-    return done.returncode, json.loads(done.stdout)
-
-
-def fly_with_fault(fault, *options, **more):
-    with fault_proxy.FaultProxy(UPSTREAM, fault) as proxy:
-        status, report = fly(proxy.address, *options, **more)
-    return status, report["summary"]
+setUpModule, tearDownModule = flights.start_server, flights.stop_server
 
 
 class SoundServer(unittest.TestCase):
@@ -58,7 +26,7 @@ class SoundServer(unittest.TestCase):
                 urls, page, earlier = pathlib.Path(folder, "urls"), pathlib.Path(folder, "page.html"), pathlib.Path(folder, "earlier")
                 page.write_text("an earlier report")
                 earlier.hardlink_to(page)
-                status, report = fly(UPSTREAM, "--format", tiles, "--forbid-holes", "--urls", urls, "--report", page,
+                status, report = fly(flights.UPSTREAM, "--format", tiles, "--forbid-holes", "--urls", urls, "--report", page,
                                      "--require", "full-view=60s,errors=0,refusals=0,holes=0,screen-error=1000px")
                 summary = report["summary"]
                 self.assertEqual(status, 0, summary)
@@ -82,7 +50,7 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual({file.name for file in page.parent.iterdir()}, {"urls", "page.html", "earlier"})
 
     def test_flies_with_several_clients(self):
-        status, report = fly(UPSTREAM, "--clients", "3", way=["--circle", "-84.25,36.3,3000,5000"])
+        status, report = fly(flights.UPSTREAM, "--clients", "3", way=["--circle", "-84.25,36.3,3000,5000"])
         self.assertEqual(status, 0)
         self.assertEqual(report["summary"]["clients"], 3)
         self.assertEqual(report["summary"]["clients_without_full_view"], 0)
@@ -94,9 +62,9 @@ class SoundServer(unittest.TestCase):
                               (["--circle", "1,2,3,5e6"], "the radius must be above 0 and below 5000000 m"),
                               (["--from", "1,2,3", "--to", "1,2,1e9"], "--to 1,2,1e9: the height must be"),
                               (["--path", "/nowhere"], "cannot be read"), ([*WAY, "--require", "p98=1s"], "p98=1s"),
-                              ([*WAY, "--header", "x"], "Name: value")):
+                              *(([*WAY, "--header", header], "Name: value") for header in ("x", "Foo Bar: x", ": x", "A: b\rC: d"))):
             with self.subTest(options=options):
-                done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *options], capture_output=True, text=True, timeout=60,
+                done = subprocess.run([BINARY, "fly", f"http://{flights.UPSTREAM}/jacksboro", *options], capture_output=True, text=True, timeout=60,
                                       check=False)
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(part, done.stderr)
@@ -107,11 +75,11 @@ class SoundServer(unittest.TestCase):
         for flag, outside in numbers.items():
             for value in ("nan", "inf", "fast", outside):
                 with self.subTest(flag=flag, value=value):
-                    done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *WAY[:4], f"{flag}={value}"], capture_output=True,
+                    done = subprocess.run([BINARY, "fly", f"http://{flights.UPSTREAM}/jacksboro", *WAY[:4], f"{flag}={value}"], capture_output=True,
                                           text=True, timeout=60, check=False)
                     self.assertEqual((done.returncode, done.stdout), (2, ""))
                     self.assertRegex(done.stderr, rf'^terrace: {flag}: must be a number [^"]*from \S+ to \d+, not "{value}"\n')
-        done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *WAY, "--clients", "1.5"], capture_output=True, text=True,
+        done = subprocess.run([BINARY, "fly", f"http://{flights.UPSTREAM}/jacksboro", *WAY, "--clients", "1.5"], capture_output=True, text=True,
                               timeout=60, check=False)
         self.assertEqual(done.returncode, 2)
         self.assertIn('--clients: must be a whole number from 1 to 1000, not "1.5"', done.stderr)
@@ -123,7 +91,7 @@ class SoundServer(unittest.TestCase):
             for option, file, code, part in (("--report", f"{folder}/no/a.html", 1, "cannot write {}: No such file or directory"),
                                              ("--urls", f"{folder}/no/a.txt", 1, "cannot write {}: No such file or directory"),
                                              ("--report", path, 2, "{} is the file of --path")):
-                done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", "--path", path, option, file], capture_output=True,
+                done = subprocess.run([BINARY, "fly", f"http://{flights.UPSTREAM}/jacksboro", "--path", path, option, file], capture_output=True,
                                       text=True, timeout=60, check=False)
                 self.assertEqual((done.returncode, done.stdout), (code, ""))
                 self.assertIn(f"terrace: {part.format(file)}", done.stderr)
@@ -132,7 +100,7 @@ class SoundServer(unittest.TestCase):
     def test_says_why_there_is_no_document(self):
         for path, part in (("nothing", "/nothing/layer.json: status 404: no such dataset; /datasets lists them"),
                            ("jacksboro?error=bad", "/jacksboro/layer.json?error=bad: status 400: error must be a finite number above 0")):
-            status, report = fly(UPSTREAM, path=path)
+            status, report = fly(flights.UPSTREAM, path=path)
             self.assertEqual((status, report["summary"]["retries"]), (1, 0))
             self.assertIn(part, " ".join(report["summary"]["findings"]))
 
@@ -179,7 +147,7 @@ class Faults(unittest.TestCase):
                     return 503, {"Retry-After": "0"}, b""
             return status, headers, body
 
-        with fault_proxy.FaultProxy(UPSTREAM, rewrite=busy) as proxy:
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=busy) as proxy:
             status, report = fly(proxy.address)
         self.assertEqual(status, 0)
         self.assertEqual(report["summary"]["outcomes"]["refused"], 2)
@@ -198,7 +166,7 @@ class Faults(unittest.TestCase):
                         return 500 if name == "layer.json" else 200, {"Retry-After": "0"}, b"damaged"
             return status, headers, body
 
-        with fault_proxy.FaultProxy(UPSTREAM, rewrite=refuse_six_and_fail_once) as proxy:
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=refuse_six_and_fail_once) as proxy:
             status, report = fly(proxy.address)
         summary = report["summary"]
         self.assertEqual(status, 0, summary)
@@ -214,7 +182,7 @@ class Faults(unittest.TestCase):
                                    (418, b"[1]", "status 418"), (418, b'{"detail":"\\u001b[2J"}', "status 418"), (418, b"<html>", "status 418"),
                                    (403, gzip.compress(b'{"detail":"not yours"}'), "status 403: not yours"),
                                    (403, b"\x1f\x8b no gzip", "status 403")):
-            with self.subTest(body=body), fault_proxy.FaultProxy(UPSTREAM, rewrite=answer(status, body)) as proxy:
+            with self.subTest(body=body), fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=answer(status, body)) as proxy:
                 code, report = fly(proxy.address)
                 self.assertEqual(code, 1)
                 self.assertEqual(report["summary"]["messages"], {"document: " + part: 1})
@@ -268,7 +236,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(report["summary"]["clients_without_document"], 1)
 
     def test_refuses_a_document_that_is_none(self):
-        with fault_proxy.FaultProxy(UPSTREAM, rewrite=lambda path, status, headers, body: (200, {}, b"<html>welcome</html>")) as proxy:
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=lambda path, status, headers, body: (200, {}, b"<html>welcome</html>")) as proxy:
             status, report = fly(proxy.address)
         self.assertEqual(status, 1)
         self.assertIn("layer.json cannot be read", " ".join(report["summary"]["findings"]))
@@ -282,7 +250,7 @@ class Faults(unittest.TestCase):
         def newer(path, status, headers, body):
             if path.split("?")[0].endswith("layer.json"):
                 headers.pop("Content-Encoding", None)
-                document = json.loads(urllib.request.urlopen(f"http://{UPSTREAM}/jacksboro/layer.json", timeout=60).read())
+                document = json.loads(urllib.request.urlopen(f"http://{flights.UPSTREAM}/jacksboro/layer.json", timeout=60).read())
                 if changed.is_set():
                     document["tiles"] = [document["tiles"][0].replace(document["version"], "0123456789ab")]
                     document["version"] = "0123456789ab"
@@ -297,7 +265,7 @@ class Faults(unittest.TestCase):
                 changed.set()
             return False
 
-        with fault_proxy.FaultProxy(UPSTREAM, change, newer) as proxy:
+        with fault_proxy.FaultProxy(flights.UPSTREAM, change, newer) as proxy:
             status, report = fly(proxy.address, **more)
         return status, report["summary"]
 
@@ -332,37 +300,13 @@ class Faults(unittest.TestCase):
         self.assertEqual(counts, {1}, "each tile is tried once")
 
     def test_says_that_a_slow_server_does_not_keep_up(self):
-        with fault_proxy.FaultProxy(UPSTREAM, tiles_per_second=10) as proxy:
+        with fault_proxy.FaultProxy(flights.UPSTREAM, tiles_per_second=10) as proxy:
             status, report = fly(proxy.address, "--require", "full-view=2s,p99=500ms,refined=90%", "--first-view-limit", "3", duration="3")
         summary = report["summary"]
         self.assertEqual(status, 1)
         self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False, False])
         self.assertIn("does not keep up", " ".join(summary["findings"]))
         self.assertLessEqual(summary["best_tiles_per_second"], 12)
-
-
-class Configured:
-    """A server with a configuration of its own, its output closed at the end."""
-
-    def __init__(self, folder, configuration):
-        path = pathlib.Path(folder, "terrace.json")
-        path.write_text(json.dumps({"listen": "127.0.0.1:0", **configuration}), encoding="utf-8")
-        self.process = subprocess.Popen([BINARY, "serve", "--config", path, "--log-level", "error"], stdout=subprocess.PIPE, text=True)
-        self.port = int(re.search(r"https?://[\d.]+:(\d+)/", self.process.stdout.readline())[1])
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.terminate()
-        self.process.stdout.close()
-        self.process.wait(60)
-
-
-def fly_to(url, *options, environment=None, way=WAY, duration="2"):
-    done = subprocess.run([BINARY, "fly", url, *way, "--duration", duration, "--json", *options], capture_output=True, text=True,
-                          timeout=120, check=False, env={**os.environ, **(environment or {})})
-    return done.returncode, json.loads(done.stdout)["summary"] if done.stdout else done.stderr
 
 
 @unittest.skipUnless(shutil.which("openssl"), "needs openssl")

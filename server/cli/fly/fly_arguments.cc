@@ -10,6 +10,7 @@
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -108,6 +109,25 @@ Result<fly::Url> DocumentOf(const FlyArguments& arguments) {
   return url;
 }
 
+// "Name: value". Messages do not repeat the text, which may be a password.
+Result<std::pair<std::string, std::string>> ParseHeader(const std::string& text) {
+  constexpr std::string_view kNameCharacters =  // RFC 9110, 5.6.2
+      "!#$%&'*+-.^_`|~0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
+  constexpr std::string_view kBlanks = " \t";
+  const std::size_t colon = text.find_first_not_of(kNameCharacters);
+  if (colon == 0 || colon == std::string::npos || text[colon] != ':') {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--header: no name of letters, digits and hyphens before a colon; give it as \"Name: value\"");
+  }
+  const std::size_t begin = std::min(text.find_first_not_of(kBlanks, colon + 1), text.size());
+  std::string value = text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin);
+  if (std::any_of(value.begin(), value.end(), [](unsigned char c) { return (c < ' ' && c != '\t') || c == 0x7F; })) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--header: the value has a line break or another control character; give it as \"Name: value\"");
+  }
+  return std::pair(text.substr(0, colon), std::move(value));
+}
+
 }  // namespace
 
 Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
@@ -116,10 +136,10 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
   if (!document) return tl::unexpected(document.error());
   Result<fly::FlightPath> path = PathOf(arguments);
   if (!path) return tl::unexpected(path.error());
-  for (const std::string& header : arguments.headers) {
-    if (header.find(':') == std::string::npos || header.find_first_of("\r\n") != std::string::npos) {
-      return MakeError(ErrorCode::kInvalidArgument, "--header: give it as \"Name: value\"");
-    }
+  for (const std::string& text : arguments.headers) {
+    auto header = ParseHeader(text);
+    if (!header) return tl::unexpected(header.error());
+    options.http.headers.push_back(*std::move(header));
   }
   options.document = *std::move(document);
   const bool is_3d = arguments.format == "3dtiles" || options.document.target.find("tileset.json") != std::string::npos;
@@ -138,7 +158,6 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
   options.arrival_limit_s = std::min(options.arrival_limit_s, arguments.first_view_limit);
   options.keeps_urls = !arguments.urls.empty();
   options.http.timeout_s = arguments.timeout;
-  options.http.headers = arguments.headers;
   options.http.verifies_certificates = !arguments.insecure;
   return options;
 }

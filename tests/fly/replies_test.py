@@ -1,0 +1,157 @@
+"""What terrace fly makes of replies and of their absence, over a server of the sample: replies_test.py BINARY SOURCE_DIR."""
+import email.utils
+import json
+import signal
+import subprocess
+import threading
+import time
+import unittest
+import urllib.request
+import zlib
+
+import fault_proxy
+import flights
+from flights import BINARY, WAY, fly, fly_to, fly_with_fault
+
+setUpModule, tearDownModule = flights.start_server, flights.stop_server
+
+REST = ["--from", "-84.25,36.3,1500", "--to", "-84.25,36.3,1500"]
+
+
+class Requests(unittest.TestCase):
+    def test_each_one_without_an_answer_is_a_timeout(self):
+        begun = []
+
+        def ignore_every_fifth(handler, number):
+            if number % 5 == 0:
+                begun.append(time.monotonic())
+                return fault_proxy.silence(handler)
+            return False
+
+        status, summary = fly_with_fault(ignore_every_fifth, "--timeout", "0.5", way=["--circle", "-84.25,36.3,1500,8000"], duration="6")
+        end = time.monotonic()
+        self.assertEqual(status, 0, summary)
+        self.assertGreaterEqual(summary["outcomes"]["timeout"], sum(at < end - 2 for at in begun))
+        self.assertLessEqual(summary["outcomes"]["timeout"], len(begun), "none is sent again without a trace")
+        self.assertEqual(summary["outcomes"]["cut"], 0)
+
+    def test_have_all_headers(self):
+        seen = {}
+
+        def note(handler, number):
+            if number == 1:
+                seen.update({name: handler.headers.get_all(name) for name in ("X-A", "User-Agent", "Authorization", "Host")})
+            return False
+
+        options = [part for text in ("X-A: 1", "x-a:2 ", "User-Agent: me", "Authorization:\tBearer t") for part in ("--header", text)]
+        self.assertEqual(fly_with_fault(note, *options)[0], 0)
+        host = seen.pop("Host")
+        self.assertEqual(seen, {"X-A": ["1", "2"], "User-Agent": ["me"], "Authorization": ["Bearer t"]})
+        self.assertRegex(host[0], r"^127\.0\.0\.1:\d+$")
+
+
+class TilesThatFail(unittest.TestCase):
+    def test_leave_no_full_view_and_do_not_hold_up_the_flight(self):
+        def lose_a_third(path, status, headers, body):
+            if fault_proxy.TILE.search(path) and zlib.crc32(path.split("?")[0].encode()) % 3 == 0:
+                return 404, {}, b""
+            return status, headers, body
+
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=lose_a_third) as proxy:
+            status, report = fly(proxy.address, "--first-view-limit", "600", "--require", "full-view=600s,refined=1%", way=REST)
+        summary = report["summary"]
+        self.assertEqual(status, 1)
+        self.assertGreater(summary["tiles"], 40)
+        self.assertGreater(summary["flying_frames"], 10)
+        self.assertEqual((summary["refined_share"], summary["first_full_view_s"]["worst"], summary["arrival_full_view_s"]), (0, None, None))
+        self.assertEqual(summary["clients_without_full_view"], 1)
+        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False])
+
+    def test_leave_holes_in_the_tiles_made_of_them(self):
+        def lose_a_parent(path, status, headers, body):
+            if path.split("?")[0].endswith("layer.json"):
+                with urllib.request.urlopen(f"http://{flights.UPSTREAM}/jacksboro/layer.json", timeout=60) as reply:
+                    document = json.load(reply)
+                (block,) = document["available"][13]
+                document["available"][13] = [{**block, "startX": 4351}]  # below the camera the client makes 13/4350/5748 from 12/2175/2874
+                return 200, {}, json.dumps(document).encode()
+            return (404, {}, b"") if is_lost and path.startswith("/jacksboro/12/2175/2874.") else (status, headers, body)
+
+        place = "-84.40796,36.30981,2000"
+        way = ["--from", place, "--to", place, "--pitch", "-90", "--fov", "30"]
+        for is_lost in (False, True):
+            with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=lose_a_parent) as proxy:
+                _, report = fly(proxy.address, way=way)
+            holes = report["summary"]["holes"]
+            self.assertGreater(holes["examined_frames"], 3)
+            self.assertEqual(holes["frames"], holes["examined_frames"] if is_lost else 0, report["summary"])
+
+
+class Replies(unittest.TestCase):
+    def test_may_name_the_time_of_the_next_request(self):
+        refused, pauses = {}, []
+
+        def refuse_twelve(handler, number):
+            if number <= 12:
+                refused[handler.path] = time.monotonic()
+                return fault_proxy.refuse(handler, email.utils.formatdate(time.time() + 4, usegmt=True))
+            if handler.path in refused:
+                pauses.append(time.monotonic() - refused.pop(handler.path))
+            return False
+
+        status, summary = fly_with_fault(refuse_twelve, way=REST, duration="1")
+        self.assertEqual((status, summary["outcomes"]["refused"], summary["retries"]), (0, 12, 12))
+        self.assertEqual(len(pauses), 12)
+        self.assertGreaterEqual(min(pauses), 3)  # in whole seconds, a 4 can be a 3
+
+    def test_may_follow_informational_ones(self):
+        def hint(handler, number):
+            if number % 2 == 0:
+                handler.wfile.write(b"HTTP/1.1 103 Early Hints\r\nLink: </x>\r\n\r\n" * (number % 3 + 1))
+            return False
+
+        status, summary = fly_with_fault(hint, "--require", "errors=0,full-view=60s")
+        self.assertEqual(status, 0, summary)
+        self.assertGreater(summary["tiles"], 60)
+
+    def test_that_redirect_a_document_name_its_url(self):
+        def move(path, status, headers, body):
+            return 301, {"Location": "/elsewhere/layer.json?error=5"}, b""
+
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=move) as proxy:
+            status, report = fly(proxy.address)
+            self.assertEqual(status, 1)
+            self.assertEqual(report["summary"]["messages"],
+                             {f"document: status 301: it moved to http://{proxy.address}/elsewhere/layer.json?error=5; give this URL": 1})
+
+    def test_with_a_tilejson_are_no_document(self):
+        status, report = fly(flights.UPSTREAM, path="jacksboro/tiles.json")
+        self.assertEqual(status, 1)
+        self.assertIn("this is the TileJSON of a map; give the URL of a layer.json or tileset.json", " ".join(report["summary"]["findings"]))
+
+    def test_in_plain_http_to_https_say_so(self):
+        status, summary = fly_to(f"https://{flights.UPSTREAM}/jacksboro", "--first-view-limit", "1")
+        self.assertEqual(status, 1)
+        self.assertIn("if the server speaks plain HTTP on this port, use http://", " ".join(summary["findings"]))
+
+
+class Interrupted(unittest.TestCase):
+    def test_before_the_first_view_has_its_document(self):
+        asked = threading.Event()
+
+        def ignore(handler, _):
+            asked.set()
+            return fault_proxy.silence(handler)
+
+        with fault_proxy.FaultProxy(flights.UPSTREAM, ignore) as proxy:
+            process = subprocess.Popen([BINARY, "fly", f"http://{proxy.address}/jacksboro", *WAY, "--json"], stdout=subprocess.PIPE,
+                                       stderr=subprocess.DEVNULL, text=True)
+            self.assertTrue(asked.wait(60))
+            process.send_signal(signal.SIGINT)
+            summary = json.loads(process.communicate(timeout=60)[0])["summary"]
+        self.assertEqual((summary["clients_without_document"], summary["clients_without_full_view"]), (0, 1))
+        self.assertNotIn("did not fly", " ".join(summary["findings"]))
+
+
+if __name__ == "__main__":
+    unittest.main()
