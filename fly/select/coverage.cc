@@ -79,10 +79,11 @@ std::optional<Found> FindOnRay(const View& view, const geo::Vec3& ray, std::uint
     next_height_m = found.min_height_m;
   }
   if (IsHiddenByFog(*distance, FogDensity(view.geodetic().height_m))) return std::nullopt;
+  if (found.drawn > 0) return found;
   // A coarse mesh may have a smaller range of heights than its descendants. Outside of it culling may be right.
   if (height_m < found.min_height_m || height_m > found.max_height_m) return std::nullopt;
   // The tile has children, but none here: the data end.
-  if (!found.deepest->children.empty() && found.drawn == 0) return std::nullopt;
+  if (!found.deepest->children.empty()) return std::nullopt;
   return found;
 }
 

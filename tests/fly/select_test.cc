@@ -203,5 +203,16 @@ TEST(Select, ATileThatHasFailedIsMissingAndNotWaitedFor) {
   EXPECT_TRUE(client.selection().IsSettled());
 }
 
+TEST(Coverage, FindsHolesInMountainsThatCoarseTilesDoNotHave) {
+  Client client(FullTree(13), {}, 1);
+  client.LoadAll(Over(7, 9000, 0));
+  for (const DrawnTile& one : client.selection().drawn) {
+    one.tile->volume = Region(RectangleOf(*one.tile->key), 2000, 3000);  // those above have 0 to 1500 m
+    one.tile->state = LoadState::kFailed;
+  }
+  EXPECT_GT(client.Measure().rays, 100);
+  EXPECT_EQ(client.Measure().missing, client.Measure().rays);
+}
+
 }  // namespace
 }  // namespace terrace::fly
