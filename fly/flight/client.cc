@@ -342,10 +342,10 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   FrameRecord record;
   record.phase = phase_;
   record.is_refined = selection.IsRefined();
-  record.is_settled = selection.IsSettled();
+  record.is_waiting = !selection.IsSettled();
   record.drawn = selection.drawn.size();
   record.wanted = selection.loads.size() + selection.pending;
-  record.is_loaded = record.is_settled && record.wanted == 0;
+  record.is_loaded = !record.is_waiting && record.wanted == 0;
   record.in_flight = static_cast<std::size_t>(active_);
   std::uint32_t version = 0;
   for (const DrawnTile& drawn : selection.drawn) {
@@ -354,7 +354,7 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
     if (can_refine) record.worst_px = std::clamp(drawn.error_px, record.worst_px, kWorstPixels);
     if (tile.children_unknown && drawn.error_px >= options_.select.max_error_px) {
       record.is_refined = false;
-      record.is_settled &= tile.state == LoadState::kFailed;
+      record.is_waiting |= tile.state != LoadState::kFailed;
     }
     const Tile& loaded = tile.content == Content::kUpsampled ? *tile.parent : tile;
     if (tile.state != LoadState::kReady || loaded.version == 0) continue;
@@ -388,7 +388,7 @@ void Client::AdvancePhase(const FrameRecord& record, double now_s) {
   // A view that comes later than the take-off still counts as one.
   if (record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
   // A tile that has failed does not hold up the flight.
-  if (phase_ == Phase::kFirstView && (record.is_settled || now_s - start_s_ > options_.first_view_limit_s)) {
+  if (phase_ == Phase::kFirstView && (!record.is_waiting || now_s - start_s_ > options_.first_view_limit_s)) {
     phase_ = Phase::kFlying;
     takeoff_s_ = now_s;
   }

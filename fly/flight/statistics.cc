@@ -106,6 +106,7 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   second.worst_hole = std::max(second.worst_hole, hole);
   ++totals.flying_frames;
   totals.refined_frames += record.is_refined ? 1 : 0;
+  totals.waiting_frames += record.is_waiting ? 1 : 0;
   totals.measured_frames += record.coverage ? 1 : 0;
   totals.hole_frames += hole > 0 ? 1 : 0;
   totals.uncovered_frames += coverage.uncovered > 0 ? 1 : 0;

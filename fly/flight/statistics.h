@@ -63,8 +63,8 @@ struct RequestRecord {
 struct FrameRecord {
   Phase phase = Phase::kFlying;
   bool is_refined = false;
-  bool is_settled = false;  // refined but for tiles that have failed
-  bool is_loaded = false;   // settled, and nothing is left to load ahead
+  bool is_waiting = false;  // the picture lacks tiles other than those that have failed
+  bool is_loaded = false;   // waits for nothing, and nothing is left to load ahead
   bool is_mixed = false;    // shows tiles of more than one version
   bool is_late = false;
   double worst_px = 0;         // of the geometric errors of drawn tiles that can be refined
@@ -98,7 +98,8 @@ struct Totals {
   std::uint64_t tiles = 0, other_requests = 0, bytes = 0, triangles = 0, retries = 0, connections = 0,
                 version_changes = 0;
   std::uint64_t incomplete_tiles = 0;
-  std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, late_frames = 0, mixed_frames = 0;
+  std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, waiting_frames = 0, late_frames = 0,
+                mixed_frames = 0;
   // Flying frames whose Coverage was measured; those of them with holes; those where no tile was selected at some
   // point.
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;

@@ -12,9 +12,9 @@
 namespace terrace::fly {
 namespace {
 
-// The share of refined frames from which on the server keeps up. Below 1: a moving view waits for its next tiles in
-// some frames even if the server is fast.
-constexpr double kMinRefinedShare = 0.75;
+// The share of frames that wait for tiles up to which the server keeps up. Above 0: a moving view waits for its next
+// tiles in some frames even if the server is fast.
+constexpr double kMaxWaitingShare = 0.25;
 
 double Share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -54,12 +54,12 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
     findings.push_back(
         fmt::format("{} of {} clients never saw a full view.", summary.never_full, summary.clients.size()));
   }
-  if (totals.flying_frames > 0 && summary.refined_share < kMinRefinedShare) {
+  if (const double waiting = Share(totals.waiting_frames, totals.flying_frames); waiting > kMaxWaitingShare) {
     findings.push_back(fmt::format(
-        "The server does not keep up: {:.0f} % of the frames of the flight were not fully refined. While the view was "
+        "The server does not keep up: {:.0f} % of the frames of the flight waited for tiles. While the view was "
         "incomplete, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
         "than {}.",
-        100 * (1 - summary.refined_share), UnrefinedTilesPerSecond(seconds), options.max_loads * options.clients,
+        100 * waiting, UnrefinedTilesPerSecond(seconds), options.max_loads * options.clients,
         Milliseconds(summary.p50_s)));
   }
   if (totals.hole_frames > 0) {

@@ -115,6 +115,24 @@ TEST(Summary, CountsWhatHappened) {
   EXPECT_NE(LineOf(1, statistics.second(1)).find("refused or failed 1"), std::string::npos);
 }
 
+// Tiles that failed are no reason to add cores.
+TEST(Summary, AServerDoesNotKeepUpIfFramesWaitForTiles) {
+  for (const int waiting : {25, 26}) {
+    Statistics statistics(1);
+    for (int i = 0; i < 100; ++i) {
+      FrameRecord frame;  // not refined
+      frame.is_waiting = i < waiting;
+      statistics.AddFrame(0.01 * i, frame);
+    }
+    const std::string text = TextOf(Summarize(SomeOptions(), statistics.record()));
+    EXPECT_EQ(text.find("The server does not keep up: 26 % of the frames of the flight waited for tiles.") !=
+                  std::string::npos,
+              waiting > 25)
+        << text;
+    EXPECT_EQ(text.find("keep up") != std::string::npos, waiting > 25) << text;
+  }
+}
+
 // A server that dies is not a fast one.
 TEST(Requirements, CountTheSecondsInWhichNoTileArrivedThoughSomeWereWanted) {
   Statistics statistics(1);
