@@ -64,7 +64,8 @@ std::optional<int> TakeSubtreeLevels(std::string_view& row) {
   return static_cast<int>(*levels);
 }
 
-// Reads a tile of the tree in segment 2, counted from the tree's root. `row`: segment 5 without its suffix.
+// Segment 2 names a tree's root. Segments 3 to 5 are a tile's level, x and y relative to that root; `row` is segment 5
+// without its suffix.
 bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
   const auto root = ParseRoot(segments[2]);
   const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
@@ -145,8 +146,8 @@ std::string_view LiteralOf(std::string_view segment) {
   return segment.find('{') == std::string_view::npos ? segment : std::string_view();
 }
 
-// Limit of a body with a list of locations: a fixed number of bytes, and 64 for each location. These are enough for two
-// numbers with all digits and the separators, which forms percent-encode.
+// Limit of a body with a list of locations: a fixed number of bytes, and 64 for each location. 64 bytes hold two
+// numbers with all digits and their separators, also where an HTML form percent-encodes these.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
 // The same for rays of six numbers.

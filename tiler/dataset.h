@@ -59,10 +59,10 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
-  // Identifies the dataset and its contents in caches: GenerationOf with ElevationModel::fingerprint. 0: TilePipeline
-  // sets it to the dataset's position, counted from 1, in its datasets(). Other pipelines use
-  // the same numbers: a dataset left at 0 must not share a RefinementCache, TileTiers or TileStore with another
-  // pipeline, neither at the same time nor later.
+  // Identifies the dataset and its contents, edits included: GenerationOf with ElevationModel::fingerprint. Caches use
+  // cache_generation(). 0: TilePipeline sets it to the dataset's position, counted from 1, in its datasets(). Other
+  // pipelines use the same numbers: a dataset left at 0 must not share a RefinementCache, TileTiers or TileStore with
+  // another pipeline, neither at the same time nor later.
   std::uint64_t generation = 0;
   // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
   // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,

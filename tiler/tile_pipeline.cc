@@ -78,7 +78,7 @@ HasTile AvailabilityOf(const Dataset& dataset) {
 }
 
 // Returns the cached refinement if it reaches the error. Else continues it, or reads heights and refines them. Caches
-// the result if it reaches the error.
+// the result if it reaches the error. `encoded`: gets times and refinement_use; nothing is encoded here.
 Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& dataset, const geo::TileKey& key,
                               double error_m, EncodedTile& encoded, const std::stop_token& stop) {
   const RefinedTileKey cache_key{dataset.cache_generation(), key, dem::TileEdits(*dataset.model).Hash(key)};

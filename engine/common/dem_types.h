@@ -38,7 +38,7 @@ enum class HoleFill : std::uint8_t {
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
 // convert these heights to the ellipsoid and back, which may change them by millimetres. They come back unchanged if
-// all sources within the edit's reach have its datum, and, for kSource, the floor as well.
+// every source within the edit's reach has the edit's datum; in kSource the floor's datum must be the edit's too.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
@@ -86,8 +86,8 @@ struct DemFile {
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
   // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
   int rank = 0;
-  bool skip_if_no_raster =
-      false;  // for files of a folder: those that are no rasters are skipped, and rasters may have only voids
+  // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
+  bool skip_if_no_raster = false;
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 

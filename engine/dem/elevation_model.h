@@ -39,8 +39,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
-  // are missing. If files have other faults, the error of the first of these is returned instead; with
-  // DemOptions::fault it is not, but each has been reported to it.
+  // of a file are missing. If a file has another fault: without DemOptions::fault, the first such error is returned
+  // instead of kCancelled; with it, each such error is passed to it, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 

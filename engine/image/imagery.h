@@ -58,15 +58,15 @@ class Imagery {
 
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
   // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that
-  // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; a side
-  // as above. kUnavailable: the image cannot be read now. kChanged: a file was replaced. kCancelled:
-  // stopped.
+  // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; `side`
+  // is a power of two from kMinSide to kMaxSide. kUnavailable: the image cannot be read now. kChanged: a file was
+  // replaced. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
   // Pictures for maps with `side` x `side` pixels, by the rules of Read. ReadMercator: of a Web Mercator grid, from the
   // pixel in `column` and `row`. ReadGeodetic: of a tile in the scheme of terrain tiles. Transparent where the image
-  // has no colour. Preconditions: a depth of 0 .. geo::kMaxLevel; the pixels lie in the grid; a valid key; a side as
-  // above. Errors: those of Read.
+  // has no colour. Preconditions: a depth of 0 .. geo::kMaxLevel; the pixels lie in the grid; a valid key; `side` as
+  // for Read. Errors: those of Read.
   Result<MapPicture> ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
                                   std::stop_token stop = {}) const;
   Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;

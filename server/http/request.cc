@@ -120,7 +120,7 @@ RequestFields FieldsOf(const Fields& sent) {
   return fields;
 }
 
-// Accepts only unambiguous lines; others go through the full parser.
+// The parts of an unambiguous first line; other lines go through the full parser.
 struct PlainLine {
   Method method;
   std::string_view name, target;

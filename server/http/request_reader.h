@@ -38,8 +38,8 @@ class RequestReader {
   // that the client left or the stream was cancelled.
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
-  // Ends the connection after the request that is being served. If none is, or its reply has begun, one more is waited
-  // for until `grace` has passed from now; a request that has begun by then is read.
+  // Ends the connection after the request that is being served. If there is none, or its reply has begun, the reader
+  // still waits `grace` for a request, and reads it if it has begun by then.
   void EndSoon(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
   bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
   bool is_ending() const { return is_ending_; }

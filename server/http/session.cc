@@ -116,8 +116,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // Does nothing while a reply is being sent: the body is released by then. A body that is being received may hold
-  // memory before has_upload_ is set, so it counts as well: ReceiveBody checks displaced_.
+  // Does nothing while a reply is being sent: the body is released by then. A body that is being received may get its
+  // memory before has_upload_ is set, so displaced_ is set for it too; ReceiveBody checks it.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
@@ -455,8 +455,8 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 }
 
 // Returns false if the client is gone, has read nothing for too long, or reads too slowly on average. `total`: bytes of
-// the reply that were written before. They count for min_rate, but not as taken by the client (`room`): the kernel may
-// only have buffered them.
+// the reply that were written before. They count for min_rate. `room` does not count them as taken by the client,
+// because the kernel may only have buffered them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
   room.BeginReply();

@@ -11,7 +11,8 @@ namespace terrace::server {
 void Wake(WaiterPtr waiter) {
   if (!waiter) return;
   const auto executor = waiter->get_executor();
-  // The waiter's thread may run at once: keep no reference here.
+  // The posted handler may run before post() returns. The timer must be destroyed on its own thread, so that this
+  // thread keeps only a weak pointer.
   const std::weak_ptr<asio::steady_timer> timer = std::exchange(waiter, nullptr);
   while (WaiterPtr here = timer.lock()) {
     try {

@@ -52,7 +52,8 @@ struct DatasetView {
   // Of height tiles; nothing: `bounds`.
   std::optional<dem::GeoBounds> height_tile_bounds;
   std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
-  // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
+  // The archive of a dataset that has no sources; null: it has sources. Parameters that a request omits are then those
+  // of the archive.
   std::shared_ptr<const tiler::BakedTiles> only_archive = nullptr;
 
   // The version in URLs; changes with the generation.

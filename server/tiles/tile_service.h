@@ -49,7 +49,8 @@ class TileService {
   // Returns the tile if it is in the cache, and counts a hit. May be called on any thread.
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
-  // For tiles that Find has not found: joins a flight, or starts one. Errors: those of TilePipeline::Build, and
+  // For tiles that Find has not found: joins a flight, or starts one, which looks in the stores and builds the tile if
+  // none has it. Errors: those of TilePipeline::Build, and
   // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
   // single thread. `client`: of JobTerms (fair_queue.h). Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request,

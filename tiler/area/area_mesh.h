@@ -17,8 +17,8 @@ enum class AreaCoordinates : std::uint8_t {
   kGeographic  // degrees east and north, metres up
 };
 
-// Degrees, -180 <= west <= 180, west < east <= west + 360 (beyond 180 across the antimeridian), -90 <= south < north
-// <= 90.
+// Degrees, -180 <= west <= 180, west < east <= west + 360, -90 <= south < north <= 90. East is above 180 if the area
+// crosses the antimeridian.
 struct AreaRequest {
   double west = 0, south = 0, east = 0, north = 0;
   double error_m = 1;  // finite, > 0

@@ -23,7 +23,7 @@ namespace terrace::tiler {
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
-  std::uint64_t generation = 0;  // Dataset::cache_generation() in TilePipeline::datasets(), which numbers the 0s
+  std::uint64_t generation = 0;  // Dataset::cache_generation() in TilePipeline::datasets(), where no generation is 0
   // TileEditsHash (tiler/dataset.h): only of edits that the tile depends on, so that a change of an edit leaves other
   // tiles valid. 0 for a dataset that has only baked tiles.
   std::uint64_t edits = 0;

@@ -39,8 +39,8 @@ struct EncodedTile {
   // The Terrain-Max-Error header: of tiles with a mesh, measured on the encoded integers; of height PNGs, the rounding
   // of heights to colours; of area meshes, measured before encoding.
   double max_error_m = 0;
-  // Metres, an upper bound of the distance to every sample of the sources, after the edits that apply to it: the
-  // Terrain-Certified-Error header. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.
+  // The Terrain-Certified-Error header, metres: an upper bound of the distance to every sample of the sources, each
+  // after the edits that apply to that sample. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.
   std::optional<double> certified_error_m = {};
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
