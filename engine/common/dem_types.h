@@ -154,8 +154,8 @@ struct RasterInfo {
   std::vector<int> overview_factors;
   std::vector<std::string> warnings;  // what else people should know, each with the remedy
   std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
-  std::string
-      wide_blocks;  // why the pass over all samples decodes blocks many times, with the remedy; empty: it does not
+  // Why the pass over all samples decodes blocks many times, with the remedy; empty: it does not.
+  std::string wide_blocks;
   std::string transform;  // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   // Each of the finest stored averages covers N x N samples; this is N. 0: none are stored.
   int min_kept_factor = 0;
