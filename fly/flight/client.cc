@@ -63,7 +63,7 @@ std::string Explain(const HttpReply& reply, Outcome outcome, bool is_document) {
   std::string text = fmt::format("status {}", reply.status);
   if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
   if (is_document && reply.status / 100 == 3 && !reply.location.empty()) {
-    text += fmt::format(": it moved to {}; give this URL", reply.location);
+    text += fmt::format("; it moved to {}; give this URL", reply.location);
   }
   if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
   return text;

@@ -92,6 +92,7 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   Totals& totals = record_.totals;
   ++second.frames;
   second.refined += record.is_refined ? 1 : 0;
+  second.waiting += record.is_waiting ? 1 : 0;
   second.drawn = std::max(second.drawn, record.drawn);
   second.wanted = std::max(second.wanted, record.wanted);
   second.in_flight = std::max(second.in_flight, record.in_flight);

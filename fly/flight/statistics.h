@@ -79,7 +79,7 @@ struct Second {
   std::uint32_t tiles = 0;
   std::uint64_t bytes = 0, triangles = 0;
   std::vector<float> latencies_s;  // of replies with tiles
-  std::uint32_t frames = 0, refined = 0;
+  std::uint32_t frames = 0, refined = 0, waiting = 0;
   double worst_px = 0, worst_stated_px = 0;
   std::size_t drawn = 0, wanted = 0, in_flight = 0;  // maxima over the frames
   double worst_hole = 0;                             // share of the screen

@@ -259,8 +259,8 @@ class HttpClient::Impl {
   // Declared before the members that use it: connections and coroutines are destroyed first.
   asio::io_context io_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
-  // By client. Its coroutines and the timers of its streams run on its strand: they would race otherwise, and a timeout
-  // would look like a cut. Only they use its idle connections.
+  // One for each client. Its coroutines and the timers of its streams run there: on several threads a timeout could
+  // race with the end of a read, and look like a cut. A client's idle connections are used on its strand alone.
   std::vector<Strand> strands_;
   std::vector<Idle> idle_;
   std::vector<std::jthread> threads_;

@@ -24,7 +24,7 @@ std::optional<std::chrono::sys_seconds> ParseDate(std::string_view text) {
   const std::chrono::year_month_day date(std::chrono::year(static_cast<int>(*year)),
                                          std::chrono::month(static_cast<unsigned>(month / 3 + 1)),
                                          std::chrono::day(*day));
-  if (!date.ok()) return std::nullopt;
+  if (!date.ok() || *hour > 23 || *minute > 59 || *second > 60) return std::nullopt;  // 60: a leap second
   return std::chrono::sys_days(date) + std::chrono::hours(*hour) + std::chrono::minutes(*minute) +
          std::chrono::seconds(*second);
 }
@@ -39,8 +39,9 @@ std::optional<double> RetryAfterSeconds(std::string_view retry_after, std::strin
   const auto due = ParseDate(retry_after);
   if (!due) return std::nullopt;
   const auto sent = ParseDate(date);
-  const std::chrono::duration<double> pause = sent ? *due - *sent : *due - now;
-  return std::max(0.0, pause.count());
+  using Seconds = std::chrono::duration<double>;  // nanoseconds in 64 bits end in the year 2262
+  const Seconds from = sent ? Seconds(sent->time_since_epoch()) : Seconds(now.time_since_epoch());
+  return std::max(0.0, (Seconds(due->time_since_epoch()) - from).count());
 }
 
 }  // namespace terrace::fly

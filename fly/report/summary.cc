@@ -12,8 +12,8 @@
 namespace terrace::fly {
 namespace {
 
-// The share of frames that wait for tiles up to which the server keeps up. Above 0: a moving view waits for its next
-// tiles in some frames even if the server is fast.
+// The server keeps up if at most this share of the frames waits for tiles. It is above 0, because a moving view waits
+// for its next tiles in some frames even if the server is fast.
 constexpr double kMaxWaitingShare = 0.25;
 
 double Share(std::uint64_t part, std::uint64_t whole) {
@@ -30,11 +30,11 @@ std::string Milliseconds(double seconds) {
 // Whether a client loaded tiles, or would have.
 bool IsLoading(const Second& second) { return second.tiles > 0 || second.wanted > 0 || second.in_flight > 0; }
 
-// Tiles per second over the seconds in which at most half of the frames were refined.
-double UnrefinedTilesPerSecond(const std::vector<Second>& seconds) {
+// Tiles per second over the seconds in which at least half of the frames waited for tiles.
+double TilesPerWaitingSecond(const std::vector<Second>& seconds) {
   std::uint64_t tiles = 0, count = 0;
   for (const Second& second : seconds) {
-    if (second.frames == 0 || second.refined * 2 > second.frames) continue;
+    if (second.frames == 0 || second.waiting * 2 < second.frames) continue;
     tiles += second.tiles;
     ++count;
   }
@@ -56,10 +56,10 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
   }
   if (const double waiting = Share(totals.waiting_frames, totals.flying_frames); waiting > kMaxWaitingShare) {
     findings.push_back(fmt::format(
-        "The server does not keep up: {:.0f} % of the frames of the flight waited for tiles. While the view was "
-        "incomplete, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
+        "The server does not keep up: {:.0f} % of the frames of the flight waited for tiles. While frames "
+        "waited, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
         "than {}.",
-        100 * waiting, UnrefinedTilesPerSecond(seconds), options.max_loads * options.clients,
+        100 * waiting, TilesPerWaitingSecond(seconds), options.max_loads * options.clients,
         Milliseconds(summary.p50_s)));
   }
   if (totals.hole_frames > 0) {
@@ -111,8 +111,8 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   }
   if (!has_all_arrived) summary.arrival_s = -1;
   const auto view_at = [&views](double share) {
-    const double seconds = Percentile(views, share);
-    return std::isinf(seconds) ? -1 : seconds;
+    const double view_s = Percentile(views, share);
+    return std::isinf(view_s) ? -1 : view_s;
   };
   summary.first_view_s = view_at(0.5);
   summary.worst_first_view_s = view_at(1);

@@ -20,7 +20,7 @@ bool Selection::IsRefined() const {
 }
 
 bool Selection::IsSettled() const {
-  if (any_kicked || drawn.empty()) return false;
+  if (any_kicked) return false;  // nothing to draw, as beside the data, is nothing to wait for
   return std::all_of(drawn.begin(), drawn.end(),
                      [](const DrawnTile& drawn_tile) { return drawn_tile.tile->state != LoadState::kUnloaded; });
 }

@@ -28,10 +28,10 @@ class Requests(unittest.TestCase):
                 return fault_proxy.silence(handler)
             return False
 
-        status, summary = fly_with_fault(ignore_every_fifth, "--timeout", "0.5", way=["--circle", "-84.25,36.3,1500,8000"], duration="6")
+        status, summary = fly_with_fault(ignore_every_fifth, "--timeout", "3", way=["--circle", "-84.25,36.3,1500,8000"], duration="10")
         end = time.monotonic()
         self.assertEqual(status, 0, summary)
-        self.assertGreaterEqual(summary["outcomes"]["timeout"], sum(at < end - 2 for at in begun))
+        self.assertGreaterEqual(summary["outcomes"]["timeout"], sum(at < end - 6 for at in begun))
         self.assertLessEqual(summary["outcomes"]["timeout"], len(begun), "none is sent again without a trace")
         self.assertEqual(summary["outcomes"]["cut"], 0)
 
@@ -101,8 +101,8 @@ class Replies(unittest.TestCase):
             return False
 
         status, summary = fly_with_fault(refuse_twelve, way=REST, duration="1")
-        self.assertEqual((status, summary["outcomes"]["refused"], summary["retries"]), (0, 12, 12))
-        self.assertEqual(len(pauses), 12)
+        self.assertEqual((status, summary["outcomes"]["refused"]), (0, 12))
+        self.assertGreaterEqual(len(pauses), 8, "all but those that the view did not need any more")
         self.assertGreaterEqual(min(pauses), 3)  # in whole seconds, a 4 can be a 3
 
     def test_may_follow_informational_ones(self):
@@ -123,7 +123,7 @@ class Replies(unittest.TestCase):
             status, report = fly(proxy.address)
             self.assertEqual(status, 1)
             self.assertEqual(report["summary"]["messages"],
-                             {f"document: status 301: it moved to http://{proxy.address}/elsewhere/layer.json?error=5; give this URL": 1})
+                             {f"document: status 301; it moved to http://{proxy.address}/elsewhere/layer.json?error=5; give this URL": 1})
 
     def test_with_a_tilejson_are_no_document(self):
         status, report = fly(flights.UPSTREAM, path="jacksboro/tiles.json")
@@ -131,7 +131,7 @@ class Replies(unittest.TestCase):
         self.assertIn("this is the TileJSON of a map; give the URL of a layer.json or tileset.json", " ".join(report["summary"]["findings"]))
 
     def test_in_plain_http_to_https_say_so(self):
-        status, summary = fly_to(f"https://{flights.UPSTREAM}/jacksboro", "--first-view-limit", "1")
+        status, summary = fly_to(f"https://{flights.UPSTREAM}/jacksboro", "--first-view-limit", "5")
         self.assertEqual(status, 1)
         self.assertIn("if the server speaks plain HTTP on this port, use http://", " ".join(summary["findings"]))
 

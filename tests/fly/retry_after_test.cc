@@ -22,13 +22,16 @@ TEST(RetryAfter, IsADateThatCountsFromTheServersOwn) {
   EXPECT_EQ(RetryAfterSeconds("Mon, 30 Nov 2026 09:00:07 GMT", "Mon, 30 Nov 2026 09:00:00 GMT", kNow), 7);
   EXPECT_EQ(RetryAfterSeconds("Tue, 01 Dec 2026 00:00:00 GMT", "Mon, 30 Nov 2026 23:59:58 GMT", kNow), 2);
   EXPECT_EQ(RetryAfterSeconds("Sun, 06 Nov 1994 08:49:37 GMT", "", kNow), 0);
+  for (const char* sent : {"", "Mon, 30 Nov 2026 10:00:00 GMT"}) {
+    EXPECT_GT(RetryAfterSeconds("Fri, 31 Dec 9999 23:59:59 GMT", sent, kNow).value(), 1e11);
+  }
 }
 
 TEST(RetryAfter, IsNothingOtherwise) {
   for (const char* text :
        {"", "-1", "inf", "nan", "soon", "12 s", "Mon, 30 Nov 2026 10:01:30 CET", "Mon, 30 Non 2026 10:01:30 GMT",
         "Mon, 31 Nov 2026 10:01:30 GMT", "Mon, 30 ovD 2026 10:01:30 GMT", "Mon, 30 Nov 2026 1x:01:30 GMT",
-        "Monday, 30-Nov-26 10:01:30 GMT"}) {
+        "Monday, 30-Nov-26 10:01:30 GMT", "Mon, 30 Nov 2026 24:01:30 GMT", "Mon, 30 Nov 2026 10:60:30 GMT"}) {
     EXPECT_EQ(RetryAfterSeconds(text, "", kNow), std::nullopt) << text;
   }
 }
