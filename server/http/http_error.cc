@@ -94,6 +94,12 @@ Response NoSuchMethodResponse(bool takes_post, std::string_view request_id) {
   return response;
 }
 
+Response OverloadedResponse(std::string_view detail, std::string_view request_id) {
+  Response response = ProblemResponse(503, detail, request_id);
+  response.headers.emplace_back("Retry-After", "1");
+  return response;
+}
+
 Response ClientErrorResponse(const Error& error, std::string_view request_id) {
   return ProblemResponse(StatusOf(error.code), error.message, request_id);
 }

@@ -18,6 +18,9 @@ int StatusOf(ErrorCode code);
 // `detail` is sent verbatim. It is text that the server wrote, never a path or a library's message.
 Response ProblemResponse(int status, std::string_view detail, std::string_view request_id);
 
+// 503 of a server that has no room now.
+Response OverloadedResponse(std::string_view detail, std::string_view request_id);
+
 // 405 with the methods of the URL. Closes the connection: the refused request may be followed by a body of any form.
 Response NoSuchMethodResponse(bool takes_post, std::string_view request_id);
 

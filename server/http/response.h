@@ -40,8 +40,8 @@ struct Response {
 
   // Prepared header lines, each with its CR LF. They replace content_type, content_encoding and etag. Null: none.
   std::shared_ptr<const std::string> lines;
-  std::size_t bytes_about_body =
-      0;                           // leading bytes of `lines` that describe the body; replies without a body omit them
+  // How many bytes at the beginning of `lines` describe the body; replies without a body omit them.
+  std::size_t bytes_about_body = 0;
   std::string_view literal_lines;  // a literal: further header lines, each with its CR LF
 
   bool try_again = false;  // a 503 that may succeed if it is retried shortly after

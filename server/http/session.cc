@@ -36,12 +36,6 @@ constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
 
-Response Overloaded(std::string_view detail, std::string_view request_id) {
-  Response response = ProblemResponse(503, detail, request_id);
-  response.headers.emplace_back("Retry-After", "1");
-  return response;
-}
-
 // Checked before a body is read: nothing if it may be sent.
 std::optional<Response> RefuseBody(const Request& request, const Admission& admission) {
   if (request.content_length > admission.max_body_bytes) {
@@ -129,7 +123,6 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ServeOne();
   asio::awaitable<void> RefuseMessage(BadRequest why);
   asio::awaitable<bool> ReceiveBody();
-  asio::awaitable<tl::expected<void, BadRequest>> ReadBody(std::string& text, std::size_t bytes);
   asio::awaitable<void> RefuseUpload();
   asio::awaitable<void> DelayRefusal();
   asio::awaitable<std::monostate> Sleep(std::chrono::milliseconds time);
@@ -196,8 +189,7 @@ asio::awaitable<void> Session::ServeAll() {
   co_await CloseGently();
 }
 
-// Refuses bytes that are no valid request. The connection must be closed then: where the next request begins is
-// unknown.
+// Refuses bytes that are no valid request. Where the next request begins is unknown: the connection must be closed.
 asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
   Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
@@ -259,7 +251,10 @@ asio::awaitable<bool> Session::ReceiveBody() {
   phase_.store(Phase::kReceives, std::memory_order_relaxed);
   is_receiving_ = true;
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
-  tl::expected<void, BadRequest> read = co_await ReadBody(body->text, first);
+  // The time in which the body arrives does not count for the deadline: it has limits of its own (ReadTimeouts).
+  auto begun = Clock::now();
+  tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
+  request.deadline += Clock::now() - begun;
   if (read && request.content_length > first) {
     TransferBudget::HoldRequest upload;
     upload.kind = TransferBudget::Kind::kUpload;
@@ -276,7 +271,9 @@ asio::awaitable<bool> Session::ReceiveBody() {
     has_upload_ = true;
     if (!displaced_) {
       body->text.reserve(request.content_length);
-      read = co_await ReadBody(body->text, request.content_length);
+      begun = Clock::now();
+      read = co_await reader_.ReadBody(request, body->text, request.content_length);
+      request.deadline += Clock::now() - begun;
     }
   }
   is_receiving_ = false;
@@ -292,19 +289,11 @@ asio::awaitable<bool> Session::ReceiveBody() {
   co_return true;
 }
 
-// The request's deadline is postponed by the time that this takes: a slow upload has limits of its own (ReadTimeouts).
-asio::awaitable<tl::expected<void, BadRequest>> Session::ReadBody(std::string& text, std::size_t bytes) {
-  const auto begun = Clock::now();
-  auto read = co_await reader_.ReadBody(exchange_.request, text, bytes);
-  exchange_.request.deadline += Clock::now() - begun;
-  co_return read;
-}
-
 // Others get its memory: release the body.
 asio::awaitable<void> Session::RefuseUpload() {
   exchange_.request.body = RequestBody();
   has_upload_ = is_receiving_ = false;
-  Response response = Overloaded("too many request bodies are on their way", exchange_.request.id);
+  Response response = OverloadedResponse("too many request bodies are on their way", exchange_.request.id);
   response.close = true;
   co_await DelayRefusal();
   co_await Reply(response);
@@ -391,8 +380,8 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
     Response bare;  // response.lines may share ownership of the tile, and so of the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    auto room =
-        co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), exchange_.request.deadline));
+    auto wait = context_->transfers->HoldWhenRoom(std::move(hold_request), exchange_.request.deadline);
+    auto room = co_await WhileConnected(std::move(wait));
     if (!room || !*room) co_return room;
     Answer again = Handle();
     if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {
@@ -408,8 +397,7 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
   }
 }
 
-// Returns false if the connection must be closed. `response` must outlive the call; if it can be made again, its body
-// may be replaced.
+// Returns false if the connection must be closed. `response` must outlive the call; its body may be replaced.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   if (can_respond_again) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
@@ -426,7 +414,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   }
   if (!room) {
     Response::Labels labels = std::move(response.labels);
-    response = Overloaded("too many replies are on their way", request.id);
+    response = OverloadedResponse("too many replies are on their way", request.id);
     labels.cache = response.labels.cache;
     response.labels = std::move(labels);
     room.emplace();
