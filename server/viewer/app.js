@@ -22,11 +22,12 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
 // `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
 // "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
-// server does not have this dataset any more. `isRefused`: it does not know the token. `shown`: the name of the dataset that was shown last.
+// server does not have this dataset any more. `isRefused`: it does not know the token. `shown`: the name of the dataset
+// that was shown last. `region`: what the camera was told last to look at.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
-                refreshing: undefined, problems: [], shown: undefined };
+                refreshing: undefined, problems: [], shown: undefined, region: undefined };
 
 const panel = new Panel({
   dataset: (name) => choose(name),
@@ -114,12 +115,13 @@ async function show() {
   remember();
 }
 
-// The heights of a part of a dataset are unknown.
+// The dataset list has no heights of a part of a dataset, so the server is asked for one. If another view is wanted before
+// it answers, this one is dropped.
 async function lookAt(region, seconds) {
-  const { dataset } = state;
+  state.region = region;
   const { longitude, latitude } = discOf(region);
-  const ground = region.isPart ? await access.heightAt(dataset, longitude, latitude) : undefined;
-  if (dataset === state.dataset) globe.lookAt({ ...region, ground }, seconds);
+  const ground = region.isPart ? await access.heightAt(state.dataset, longitude, latitude) : undefined;
+  if (state.region === region) globe.lookAt({ ...region, ground }, seconds);
 }
 
 function choose(name) {
@@ -278,11 +280,12 @@ async function labelContours() {
 // Outlines of edits follow the drawn ground. They are read when they are first wanted, and anew for each version.
 async function outlineEdits() {
   const { dataset } = state;
-  const isWanted = () => state.edits && dataset === state.dataset && Boolean(dataset.urls.edits);
+  const keyOf = ({ name, version }) => `${name} ${version}`;
+  const key = keyOf(dataset);
+  const isWanted = () => state.edits && key === keyOf(state.dataset) && Boolean(dataset.urls.edits);
   if (!isWanted()) return globe.overlay.setLine("edits", undefined);
   try {
     const { drawEdits, fetchEdits } = await import("/viewer/edit_outlines.js");
-    const key = `${dataset.name} ${dataset.version}`;
     if (state.editsOf?.key !== key) state.editsOf = { key, features: fetchEdits(dataset, access.headers) };
     const features = await state.editsOf.features;
     if (isWanted()) state.editsInView = drawEdits(globe.overlay, features, globe.viewTest(), (...at) => globe.heightAt(...at));
@@ -323,6 +326,7 @@ async function apply(view) {
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
+  state.region = undefined;
   if (isNamed && view.camera) globe.camera = view.camera;
   else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);

@@ -283,7 +283,26 @@ describe('a region of fine data on a globe', { skip: process.env.TERRACE_URL ? '
     await page.locator('#dataset').selectOption('earth');
     await page.waitForFunction(() => terrace.globe.camera[2] > 1e7, undefined, { timeout: kSettleMs });
     assert.ok(await page.locator('#whole').isHidden(), 'all of this dataset is of one kind');
+    await page.locator('#dataset').selectOption('mosaic');
+    await page.waitForFunction(() => terrace.globe.camera[2] < 60000, undefined, { timeout: kSettleMs });
     assert.deepEqual(page.wrongs, []);
+  });
+
+  it('is found also if the list of datasets is read meanwhile', async () => {
+    await page.locator('#whole').click();
+    await page.waitForFunction(() => terrace.globe.camera[2] > 1e7, undefined, { timeout: kSettleMs });
+    const listed = page.waitForResponse(/\/datasets$/, { timeout: kSettleMs });
+    let isHeld = false;
+    await page.route(/\/mosaic\/heights/, async (route) => {
+      isHeld = true;
+      await listed;
+      await page.waitForTimeout(500);  // the page has the list now
+      await route.continue();
+    });
+    await page.locator('#home').click();
+    await page.waitForFunction(() => terrace.globe.camera[2] < 60000, undefined, { timeout: kSettleMs });
+    assert.ok(isHeld, 'the page has asked for a height');
+    await page.unroute(/\/mosaic\/heights/);
   });
 });
 
