@@ -9,6 +9,7 @@
 #include "server/http/http_error.h"
 #include "server/routes.h"
 #include "server/telemetry/reply_record.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {
 namespace {

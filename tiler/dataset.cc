@@ -9,6 +9,7 @@
 #include "tiler/map/contour_tile.h"
 #include "tiler/map/map_heights.h"
 #include "tiler/map/relief.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::tiler {
 namespace {

@@ -12,11 +12,12 @@
 #include "engine/image/water_raster.h"
 #include "proto/gltf/glb_options.h"
 #include "tiler/mesh/mesh_options.h"
-#include "tiler/store/baked_tiles.h"
 #include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
+
+class BakedTiles;  // an archive of baked tiles: tiler/store/baked_tiles.h, which is not installed
 
 // The source of a dataset's water: a mask, a sea level, or none. At most one is set.
 struct WaterOptions {

@@ -15,6 +15,7 @@
 #include "tiler/mesh/error_allowed_at_samples.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/store/baked_tiles.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/surface/drawn_mesh_cache.h"
 #include "tiler/surface/drawn_points.h"
@@ -172,8 +173,8 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<Refine
 
 TilePipeline::~TilePipeline() = default;
 
-ByteCacheStats TilePipeline::drawn_meshes() const { return drawn_->stats(); }
-ByteCacheStats TilePipeline::refinements() const { return refinements_->stats(); }
+CacheStats TilePipeline::drawn_meshes() const { return drawn_->stats(); }
+CacheStats TilePipeline::refinements() const { return refinements_->stats(); }
 
 Result<const Dataset*> TilePipeline::Find(std::uint32_t dataset) const {
   if (dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "there is no dataset {}", dataset);

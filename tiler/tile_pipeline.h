@@ -14,7 +14,7 @@
 #include "engine/dem/elevation_model.h"
 #include "tiler/area/area_mesh.h"
 #include "tiler/dataset.h"
-#include "tiler/store/byte_cache.h"
+#include "tiler/store/cache_stats.h"
 #include "tiler/surface/drawn_surface.h"
 #include "tiler/surface/point_heights.h"
 #include "tiler/tile/encoded_tile.h"
@@ -86,8 +86,8 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
-  ByteCacheStats drawn_meshes() const;  // which does not count hits and misses
-  ByteCacheStats refinements() const;
+  CacheStats drawn_meshes() const;  // which does not count hits and misses
+  CacheStats refinements() const;
 
  private:
   // kNotFound: there is no such dataset; for FindModel also: it has no sources.

@@ -18,6 +18,7 @@
 #include "server/api/map_formats.h"
 #include "server/http/text.h"
 #include "server/openapi/operations.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {
 namespace {

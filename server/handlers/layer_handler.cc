@@ -8,6 +8,7 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {
 namespace {

@@ -13,6 +13,7 @@
 #include "archive/archive.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoder_version.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {
 namespace {

@@ -312,7 +312,7 @@ std::string Metrics::Text(const ServerState& state) const {
     tiers.push_back({"memory", "drawn_meshes", {state.catalog->pipeline->drawn_meshes()}, false});
   }
   const dem::KeptBlocks blocks = dem::ElevationModel::CountKeptBlocks();
-  tiler::ByteCacheStats of_blocks;
+  tiler::CacheStats of_blocks;
   of_blocks.entries = blocks.count;
   of_blocks.bytes = blocks.bytes;
   tiers.push_back({"memory", "sample_blocks", {of_blocks}, false});

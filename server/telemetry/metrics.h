@@ -30,10 +30,10 @@ class Metrics {
 
   struct ServerState {
     TileService::Stats tiles;
-    std::size_t queued = 0;             // jobs that wait for a worker
-    std::size_t in_flight = 0;          // tiles, documents and other work that requests wait for
-    std::uint64_t joined = 0;           // requests that waited for the work of another request
-    tiler::ByteCacheStats refinements;  // in memory
+    std::size_t queued = 0;         // jobs that wait for a worker
+    std::size_t in_flight = 0;      // tiles, documents and other work that requests wait for
+    std::uint64_t joined = 0;       // requests that waited for the work of another request
+    tiler::CacheStats refinements;  // in memory
     // The tiers below memory: the first `tile_stores` hold tiles, the others refinements.
     std::vector<tiler::StoreBase*> stores;
     std::size_t tile_stores = 0;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
+#include "tiler/store/baked_tiles.h"
 #include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/elapsed_time.h"
+#include "tiler/store/byte_cache.h"
 
 namespace terrace::server {
 namespace {
@@ -96,6 +97,8 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
   had_edits_ = std::ranges::any_of(catalog.datasets,
                                    [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_hash); });
 }
+
+void TileService::SetCacheBytes(std::size_t capacity) { tiers_.memory().SetCapacity(capacity); }
 
 TileService::Stats TileService::stats() const {
   Stats stats;

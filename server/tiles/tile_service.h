@@ -66,7 +66,7 @@ class TileService {
     return tiers_.Erase(selection, stop);
   }
 
-  void SetCacheBytes(std::size_t capacity) { tiers_.memory().SetCapacity(capacity); }
+  void SetCacheBytes(std::size_t capacity);
 
   struct Stats {
     std::uint64_t hits = 0;                              // found in memory
@@ -75,7 +75,7 @@ class TileService {
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
     std::size_t in_flight = 0;                           // builds under way or waiting
-    tiler::ByteCacheStats cache;
+    tiler::CacheStats cache;
   };
   Stats stats() const;
 

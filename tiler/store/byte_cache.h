@@ -30,13 +30,9 @@
 #include <utility>
 #include <vector>
 
-namespace terrace::tiler {
+#include "tiler/store/cache_stats.h"
 
-struct ByteCacheStats {
-  std::size_t entries = 0;
-  std::size_t bytes = 0;               // as charged
-  std::uint64_t hits = 0, misses = 0;  // where the owner counts them; the cache does not know what counts as a request
-};
+namespace terrace::tiler {
 
 // BytesOf(value) returns the size of a value and is found by argument-dependent lookup. Key::generation identifies the
 // source that an entry was made from.
@@ -140,8 +136,9 @@ class ByteCache {
     }
   }
 
-  ByteCacheStats stats() const {
-    ByteCacheStats stats;
+  // `hits` and `misses` are 0: the owner counts them, the cache does not know what counts as a request.
+  CacheStats stats() const {
+    CacheStats stats;
     for (const auto& shard : shards_) {
       const std::lock_guard lock(shard->mutex);
       stats.entries += shard->live();

@@ -34,8 +34,8 @@ Result<RefinementCache::Erased> RefinementCache::Erase(const TileSelection& sele
   return erased;
 }
 
-ByteCacheStats RefinementCache::stats() const {
-  ByteCacheStats stats = memory_.stats();
+CacheStats RefinementCache::stats() const {
+  CacheStats stats = memory_.stats();
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
   return stats;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tiler/store/byte_cache.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/tile_store.h"
 
@@ -37,7 +38,7 @@ class RefinementCache {
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
   // Of the memory tier.
-  ByteCacheStats stats() const;
+  CacheStats stats() const;
   StoreBase* below() const { return below_.get(); }  // may be null
 
  private:

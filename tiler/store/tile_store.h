@@ -12,7 +12,7 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "tiler/store/byte_cache.h"
+#include "tiler/store/cache_stats.h"
 #include "tiler/store/tile_selection.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"
@@ -41,12 +41,9 @@ inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
   return selection.Contains(key.generation, key.request.key, IsMercator(key.request.format));
 }
 
-// The tier in memory.
-using TileCache = ByteCache<CacheKey, CacheKeyHash, EncodedTile>;
-
-struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
-  std::uint64_t errors = 0;           // reads and writes that failed
-  std::uint64_t damaged = 0;          // records with a wrong checksum, which were erased
+struct StoreStats : CacheStats {  // entries and bytes: approximate
+  std::uint64_t errors = 0;       // reads and writes that failed
+  std::uint64_t damaged = 0;      // records with a wrong checksum, which were erased
   std::uint64_t written = 0;
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
   bool on = false;            // values are found and written; false: switched off, or it can only read or only write

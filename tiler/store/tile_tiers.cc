@@ -4,18 +4,21 @@
 #include <utility>
 
 #include "engine/core/elapsed_time.h"
+#include "tiler/store/byte_cache.h"
 
 namespace terrace::tiler {
 
 TileTiers::TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
                      HeaderWriter write_header_lines)
-    : memory_(memory_bytes),
+    : memory_(std::make_unique<TileCache>(memory_bytes)),
       stores_(std::move(stores)),
       write_header_lines_(write_header_lines),
       store_times_(stores_.size()) {}
 
+TileTiers::~TileTiers() = default;
+
 Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build) {
-  if (TilePtr tile = memory_.Find(key)) return tile;
+  if (TilePtr tile = memory_->Find(key)) return tile;
   for (std::size_t i = 0; i < stores_.size(); ++i) {
     const auto begun = std::chrono::steady_clock::now();
     std::optional<EncodedTile> found = stores_[i]->Find(key);
@@ -42,7 +45,7 @@ Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<
 TilePtr TileTiers::Keep(const CacheKey& key, EncodedTile tile, std::size_t stores_above) {
   if (write_header_lines_ != nullptr) tile.header_lines = write_header_lines_(key.request, tile);
   auto kept = std::make_shared<const EncodedTile>(std::move(tile));
-  memory_.Insert(key, kept);
+  memory_->Insert(key, kept);
   for (std::size_t i = 0; i < stores_above; ++i) stores_[i]->Insert(key, kept);
   return kept;
 }
@@ -59,7 +62,7 @@ Result<TileTiers::Erased> TileTiers::Erase(const TileSelection& selection, const
       done = tl::unexpected(std::move(of_store.error()));
     }
   }
-  erased.memory = memory_.EraseIf([&](const CacheKey& key) { return IsSelected(selection, key); });
+  erased.memory = memory_->EraseIf([&](const CacheKey& key) { return IsSelected(selection, key); });
   if (!done) return tl::unexpected(std::move(done.error()));
   return erased;
 }

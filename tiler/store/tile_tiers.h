@@ -21,6 +21,10 @@
 
 namespace terrace::tiler {
 
+template <typename Key, typename Hash, typename Value>
+class ByteCache;  // tiler/store/byte_cache.h, which is not installed
+using TileCache = ByteCache<CacheKey, CacheKeyHash, EncodedTile>;
+
 // Writes those header lines of a reply that describe the tile. The TileRequest is CacheKey::request, whose `dataset` is
 // 0.
 using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
@@ -32,11 +36,11 @@ class TileTiers {
   // the tile; null: they stay empty.
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
             HeaderWriter write_header_lines = nullptr);
+  ~TileTiers();
 
-  // The tier in memory: the only one that is asked without blocking. It does not
-  // count: hits and misses of its stats() are 0.
-  TileCache& memory() { return memory_; }
-  const TileCache& memory() const { return memory_; }
+  // The tier in memory: the only one that is asked without blocking.
+  TileCache& memory() { return *memory_; }
+  const TileCache& memory() const { return *memory_; }
 
   // `build` is called if no tier has the tile. Its error is returned and not kept; its exceptions pass. Blocks.
   Result<TilePtr> FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build);
@@ -56,7 +60,7 @@ class TileTiers {
  private:
   TilePtr Keep(const CacheKey& key, EncodedTile tile, std::size_t stores_above);
 
-  TileCache memory_;
+  const std::unique_ptr<TileCache> memory_;
   const std::vector<std::shared_ptr<TileStore>> stores_;
   const HeaderWriter write_header_lines_;
   std::vector<std::atomic<std::int64_t>> store_times_;  // microseconds

@@ -20,6 +20,7 @@
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
 #include "tiler/encoder_version.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::cli {
 namespace {

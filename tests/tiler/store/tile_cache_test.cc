@@ -3,7 +3,9 @@
 #include <thread>
 #include <vector>
 
+#include "tiler/store/byte_cache.h"
 #include "tiler/store/tile_store.h"
+#include "tiler/store/tile_tiers.h"
 
 namespace terrace::tiler {
 namespace {
@@ -231,7 +233,7 @@ TEST(TileCache, StaysInBudgetUnderManyThreads) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  const ByteCacheStats stats = cache.stats();
+  const CacheStats stats = cache.stats();
   EXPECT_LE(stats.bytes, kCapacity);
   EXPECT_EQ(stats.bytes, stats.entries * (40'000 + TileCache::kEntryOverheadBytes));
 }

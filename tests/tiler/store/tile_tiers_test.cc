@@ -1,3 +1,4 @@
+#include "tiler/store/byte_cache.h"
 #include "tiler/store/tile_tiers.h"
 
 #include <gtest/gtest.h>
