@@ -1,4 +1,3 @@
-#include "tiler/store/byte_cache.h"
 #include "tiler/store/tile_tiers.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +6,8 @@
 #include <string>
 #include <thread>
 #include <unordered_map>
+
+#include "tiler/store/byte_cache.h"
 
 namespace terrace::tiler {
 namespace {
