@@ -59,13 +59,15 @@ struct Dataset {
   std::vector<WatchedFile> baked_files;              // a change of one of them means that there is another archive
   WaterOptions water;
   ImageryOptions imagery;
-  int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
-  // Identifies the dataset and its contents, edits included: GenerationOf with ElevationModel::fingerprint. Caches use
-  // cache_generation(). 0: TilePipeline sets it to the dataset's position, counted from 1, in its datasets(). Other
-  // pipelines use the same numbers: a dataset left at 0 must not share a RefinementCache, TileTiers or TileStore with
-  // another pipeline, neither at the same time nor later.
+  // N: the quantized-mesh tiles of levels 0, N, 2N, ... have the metadata extension, which lists the tiles below them.
+  // 0: none has it.
+  int metadata_availability = 0;
+  // Identifies the dataset and its contents, edits included. If a cache outlives the pipeline or serves several, set it
+  // to GenerationOf(dataset, model->fingerprint()). If it is left at 0, TilePipeline sets it to the dataset's position,
+  // counted from 1, in its datasets(). Other pipelines use the same numbers, so such a dataset must not share a
+  // RefinementCache, TileTiers or TileStore with another pipeline, neither at the same time nor later.
   std::uint64_t generation = 0;
-  // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
+  // GenerationOf(dataset, model->unedited_fingerprint()); 0: there are no edits. Caches are keyed by cache_generation()
   // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,
   // dem::TileEdits::Hash for refinements.
   std::uint64_t unedited_generation = 0;

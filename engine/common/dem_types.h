@@ -19,8 +19,9 @@ namespace terrace::dem {
 
 // How to interpret the samples of a source.
 struct SourceOptions {
-  // The vertical datum: "crs" (as the file states it), "unknown", "ellipsoid", "egm96", "egm2008", a vertical reference
-  // system ("EPSG:5703"), or the path of a geoid grid.
+  // The vertical datum: "crs" (as the file states it; if it states none, as "unknown"), "unknown" (heights are used
+  // unchanged, with a warning), "ellipsoid", "egm96", "egm2008", a vertical reference system ("EPSG:5703"), or the
+  // path of a geoid grid.
   std::string vertical = "crs";
   bool find_voids = true;           // detects undeclared nodata values
   std::vector<double> nodata = {};  // further raw values that mean void
@@ -37,12 +38,15 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
-// convert these heights to the ellipsoid and back, which may change them by millimetres. They come back unchanged if
-// every source within the edit's reach has the edit's datum; in kSource the floor's datum must be the edit's too.
+// convert these heights to the ellipsoid and back, which may change them by millimetres. They stay unchanged if all
+// sources that the edit touches have its datum; for kSource, the datum in which the floor is returned (see there) must
+// be the edit's too.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  kSource,       // the source's own; where the floor is used, that of the last source by precedence that has a geoid
+  // The source's own. The floor is returned in the datum of the source of lowest precedence that has a geoid; above
+  // the ellipsoid if none has one.
+  kSource,
 };
 
 class AveragesBudget;
@@ -105,7 +109,8 @@ struct GeoPosition {
   double longitude = 0, latitude = 0;
 };
 
-// A rectangle of nodes: its first column and row, and how many of each.
+// A rectangle of nodes of a lattice, with rows counted northwards, or of pixels of a Web Mercator grid, with rows
+// counted southwards: its first column and row, and how many of each.
 struct NodeWindow {
   std::int64_t column = 0, row = 0;
   int columns = 0, rows = 0;
@@ -153,7 +158,7 @@ struct RasterInfo {
   std::string found_voids;  // detected nodata values, for people; empty: none
   std::vector<int> overview_factors;
   std::vector<std::string> warnings;  // what else people should know, each with the remedy
-  std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
+  std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none is ignored
   // Why the pass over all samples decodes blocks many times, with the remedy; empty: it does not.
   std::string wide_blocks;
   std::string transform;  // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
@@ -170,7 +175,7 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
-  int max_source_level = 0;  // the deepest one without edits, which may add levels
+  int max_source_level = 0;  // what max_level would be without edits, which may add levels
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.
@@ -182,7 +187,7 @@ struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };
 
-// Numbers of samples read for nodes and pixels, at the resolution that they were read at.
+// How many samples were read for nodes and pixels. A sample of an overview, or a stored average, counts as one.
 struct SampleCounts {
   std::uint64_t measured = 0;
   std::uint64_t filled = 0;  // voids filled from the heights around them

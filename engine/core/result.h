@@ -1,7 +1,7 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
 // Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
-// errors. The file that calls a library catches its exceptions, except std::bad_alloc, which functions that read, build
-// or encode may throw.
+// errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Only
+// std::bad_alloc passes: functions that read, build or encode may throw it.
 #pragma once
 
 #include <fmt/core.h>

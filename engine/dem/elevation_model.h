@@ -39,8 +39,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
-  // of a file are missing. If a file has another fault: without DemOptions::fault, the first such error is returned
-  // instead of kCancelled; with it, each such error is passed to it, and kCancelled is returned.
+  // of a file are missing. If some files have other errors: without DemOptions::fault, the first of these errors is
+  // returned; with it, it is called with each of them, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -91,20 +91,21 @@ class ElevationModel {
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 
-  // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
-  // sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has no effect.
-  // `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is void in the
-  // source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the sources,
-  // the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A height does not
-  // depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
+  // Heights at the sources' full resolution, bilinear between samples and rounded to 2^-10 m, in the order of `points`.
+  // NaN outside the sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has
+  // no effect. `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is
+  // void in the source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the
+  // sources, the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A height does
+  // not depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
 
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: the box around an edit that changes heights or
-  // cuts a hole lies below a ray or close to it. Boxes more than 125 m from the ray never count.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a ray passes over the box around an edit that
+  // changes heights or cuts a hole, or closely beside it. Boxes more than 125 m to the side of the ray, measured on the
+  // map, never count.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

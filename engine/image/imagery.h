@@ -29,7 +29,7 @@ struct MapPicture {
   std::vector<std::uint8_t> rgba;  // 4 * side * side
 };
 
-// Where an image lies, and the first levels of its map tiles whose pixels are as fine as its own.
+// Where an image lies, and the deepest levels that its map tiles need: the first whose pixels are as fine as its own.
 struct ImageExtent {
   GeoBounds bounds;
   int max_mercator_depth = 1;  // depth d: a grid of 256 << d pixels around the Earth

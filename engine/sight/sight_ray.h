@@ -35,8 +35,8 @@ struct SightAnswer {
 
 // Metres. A ray that touches the ground, as from a point that was read from the same surface, is not blocked.
 inline constexpr double kSightTolerance = 1e-3;
-// Metres. The longest ray of ElevationModel::LookAlong, which does not check it: points near the ground that are
-// farther apart never see each other.
+// Metres. The longest ray that ElevationModel::LookAlong accepts: a precondition, which is not checked. Points near the
+// ground that are farther apart never see each other.
 inline constexpr double kMaxSightLength = 3e6;
 
 // Metres, along the chord.

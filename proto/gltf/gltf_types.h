@@ -24,7 +24,8 @@ inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", Glb
                                                                    {"quantized", GlbCompression::kQuantized},
                                                                    {"meshopt", GlbCompression::kMeshopt}}};
 
-// The number type of positions with a compression.
+// The number type that the grid of positions is chosen for: the grid for floats is finer. It need not be the type that
+// the file stores.
 constexpr PositionWidth WidthOf(GlbCompression compression) {
   const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
   return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;

@@ -32,12 +32,12 @@ bool IsOutside(const Grant& grant, const Route& route) {
   return false;
 }
 
-bool HasName(const RequestContext& context) { return context.grant && !context.grant->name.empty(); }
+bool HasToken(const RequestContext& context) { return context.grant && !context.grant->name.empty(); }
 
-// The key of a client for rate limits: "/" and the name of its token, or ClientIdentity::counted_as if it has no token
-// with a name. No address begins with "/".
+// The key of a client for rate limits: "/" and the name of its token, or ClientIdentity::counted_as if it has no known
+// token. No address begins with "/".
 std::string Who(const RequestContext& context, const ClientIdentity& client) {
-  return HasName(context) ? "/" + context.grant->name : client.counted_as;
+  return HasToken(context) ? "/" + context.grant->name : client.counted_as;
 }
 
 Response Unauthorized(bool has_token, std::string_view request_id) {
@@ -126,7 +126,7 @@ ClientIdentity AdmissionControl::Identify(Request& request, const ClientIdentity
   const asio::ip::address address =
       options_.proxies.trusted.empty() ? peer.address : ResolveClient(request, peer.address, options_.proxies);
   ClientIdentity client = address == peer.address ? peer : ClientIdentity(address);
-  request.client = HasName(context) ? std::hash<std::string>{}(Who(context, client)) | 1 : client.number;
+  request.client = HasToken(context) ? std::hash<std::string>{}(Who(context, client)) | 1 : client.number;
   return client;
 }
 
@@ -134,7 +134,7 @@ RateLimiter::Turn AdmissionControl::TakeTurn(const RequestContext& context, cons
                                              std::chrono::milliseconds longest_wait) {
   if (context.route.row != nullptr && context.route.row->is_probe) return {};
   RateLimiter::Rate rate = options_.rate;
-  if (HasName(context) && context.grant->requests_per_second > 0) {
+  if (HasToken(context) && context.grant->requests_per_second > 0) {
     rate.per_second = context.grant->requests_per_second;
     rate.burst = 2 * rate.per_second;
   }

@@ -65,8 +65,8 @@ Result<void> CheckHasQueriedTiles(const DatasetView& dataset, tiler::TileFormat 
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
-// The coding in `offered` with the highest quality, if that is at least the quality of identity; among equals the
-// first. Identity that is not named has quality 0. Without Accept-Encoding: identity.
+// The coding in `offered` with the highest quality in Accept-Encoding; among equals the first. Identity only if the
+// header names it with a higher quality, or accepts none of the others.
 tiler::Coding NegotiateCoding(std::string_view accept_encoding,
                               std::span<const tiler::Coding> offered = tiler::kCodings);
 

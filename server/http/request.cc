@@ -190,7 +190,7 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
   const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may be split between two reads
   const std::size_t end = bytes.find("\r\n\r\n", from);
   const std::string_view head = bytes.substr(0, end);  // all of it if there is no end
-  // "OPTIONS " before the target, " HTTP/1.1" after it, and a CR whose LF has not arrived.
+  // The first line may have 18 bytes more than the target: "OPTIONS ", " HTTP/1.1", and a CR whose LF has not arrived.
   const std::size_t first_line = head.find("\r\n");
   if (std::min(first_line, head.size()) > kMaxTargetBytes + 18) return Bad(414, kLongTarget);
   if (end == std::string_view::npos ? bytes.size() >= kMaxHeadBytes : end + 4 > kMaxHeadBytes) {

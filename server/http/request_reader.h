@@ -38,8 +38,9 @@ class RequestReader {
   // that the client left or the stream was cancelled.
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
-  // Ends the connection after the request that is being served. If there is none, or its reply has begun, the reader
-  // still waits `grace` for a request, and reads it if it has begun by then.
+  // Ends the connection after the request that is being served. If none is being served, or the head of its reply has
+  // promised to keep the connection, the client may send another one: the reader waits `grace` for its first byte, and
+  // then reads it.
   void EndSoon(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
   bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
   bool is_ending() const { return is_ending_; }

@@ -110,8 +110,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // Does nothing while a reply is being sent: the body is released by then. A body that is being received may get its
-  // memory before has_upload_ is set, so displaced_ is set for it too; ReceiveBody checks it.
+  // Does nothing while a reply is being sent: the body is released by then. While ReceiveBody waits for memory, the
+  // budget may grant it and take it back before has_upload_ is set. So displaced_ is set then too, and ReceiveBody
+  // checks it after the wait.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
@@ -137,7 +138,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<std::optional<MaybeRoom>> RoomLater(Response& response);
   TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
   bool SendsBody(const Response& response) const;
-  asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
+  asio::awaitable<bool> Reply(Response& response, bool is_answer = false);
   asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
@@ -226,7 +227,7 @@ asio::awaitable<bool> Session::ServeOne() {
     if (!response) co_return co_await GiveUp();
     answer = *std::move(response);
   }
-  co_return co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
+  co_return co_await Reply(std::get<Response>(answer), /*is_answer=*/true);
 }
 
 // For a request whose answer nobody waits for: the client is gone, or others get the request's memory. Returns false,
@@ -398,16 +399,17 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
 }
 
 // Returns false if the connection must be closed. `response` must outlive the call; its body may be replaced.
-asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
+// `is_answer`: it comes from Handle, which can be called again after a wait for memory; false for refusals.
+asio::awaitable<bool> Session::Reply(Response& response, bool is_answer) {
   const Request& request = exchange_.request;
-  if (can_respond_again) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
+  if (is_answer) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
   MaybeRoom room;
   if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
     room = context_->transfers->TryHold(HoldRequestOf(response));
   }
-  if (!room && can_respond_again) {
+  if (!room && is_answer) {
     std::optional<MaybeRoom> later = co_await RoomLater(response);
     if (!later) co_return co_await GiveUp();
     room = *std::move(later);
@@ -432,7 +434,8 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
-  // While the session waited, ClientLeft may have sent the first bytes of a reply as a probe (client_watch.h).
+  // To find out whether the client is still there, ClientLeft may have sent the bytes that every reply begins with
+  // (client_watch.h). They are not sent again.
   Skip(stream_.TakeBytesSentAhead(), left);
   // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);

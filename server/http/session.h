@@ -2,10 +2,11 @@
 //
 // A session runs on one thread. The memory of a connection is bounded: one read buffer of kMaxHeadBytes, one request
 // with a body of at most the size that its admission allows, and one reply. Bodies and replies larger than
-// TransferBudget::kFreeBytes count against a budget that all sessions share. If it has no memory, they wait until the
-// request's deadline, and are then refused; an upload is refused earlier if others get its memory. A request over its
-// client's rate waits for its turn; if the turn would come after half of the time to its deadline, it is refused after
-// kRefusalDelay (http_error.h). All these waits and the answer itself share one deadline.
+// TransferBudget::kFreeBytes count against a budget that all sessions share. If the budget is used up, the body or the
+// reply waits for memory; at the request's deadline the request is refused. An upload is refused earlier if its memory
+// is given to others. A request over its client's rate waits for its turn; if the turn would come after half of the
+// time to its deadline, it is refused after kRefusalDelay (http_error.h). All these waits and the answer itself share
+// one deadline.
 #pragma once
 
 #include <atomic>

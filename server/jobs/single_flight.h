@@ -158,7 +158,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   co_return FlightResult(std::move(*outcome), joined);
 }
 
-// mutex_ is not held: the pool may displace another flight's job.
+// To be called without mutex_: the pool may drop another flight's job, whose on_dropped takes mutex_.
 template <typename Key, typename Value, typename Hash>
 void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, BuildWork build, JobTerms terms) {
   PoolJobPtr job;

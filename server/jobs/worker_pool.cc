@@ -11,7 +11,7 @@ namespace terrace::server {
 void Wake(WaiterPtr waiter) {
   if (!waiter) return;
   const auto executor = waiter->get_executor();
-  // The posted handler may run before post() returns. The timer must be destroyed on its own thread, so that this
+  // The timer must be destroyed on its own thread, and the posted handler may have run when post() returns. So this
   // thread keeps only a weak pointer.
   const std::weak_ptr<asio::steady_timer> timer = std::exchange(waiter, nullptr);
   while (WaiterPtr here = timer.lock()) {

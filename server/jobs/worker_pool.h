@@ -34,9 +34,9 @@ namespace terrace::server {
 // A timer that expires at the waiter's deadline and is cancelled by Wake. It belongs to the thread of its executor.
 using WaiterPtr = std::shared_ptr<asio::steady_timer>;
 
-// Ends the wait, on the waiter's own thread. The cancellation is posted to that thread, which runs it only after the
-// coroutine has suspended in its wait: it never comes before the wait. From any thread; never throws. Null: nothing to
-// do.
+// Ends the wait, on the waiter's own thread. To cancel a timer before its wait has begun would have no effect, so the
+// cancellation is posted to that thread, where it runs after the coroutine has suspended. From any thread; never
+// throws. Null: nothing to do.
 void Wake(WaiterPtr waiter);
 
 // Runs on a worker and may block. Its stop token is stopped when nobody waits for the result.

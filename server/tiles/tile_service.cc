@@ -72,7 +72,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
     co_return tl::unexpected(std::move(flight.value.error()));
   }
-  // A tile that an earlier flight had just put into memory gets the status of that flight.
+  // FindOrBuild may have found in memory what an earlier flight had just put there: `found_in` is then that flight's.
   const CacheStatus found = (*flight.value)->found_in != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }

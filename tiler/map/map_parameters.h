@@ -7,7 +7,10 @@
 
 namespace terrace::tiler {
 
-enum class SlopeStyle : std::uint8_t { kColors, kDegrees };
+enum class SlopeStyle : std::uint8_t {
+  kColors,   // a colour for each slope
+  kDegrees,  // grey: twice the slope in degrees
+};
 
 // Members that a format does not use have their defaults.
 struct MapParameters {

@@ -2,8 +2,8 @@
 // TileTiers. The server passes those in ServerOptions::tile_stores (server/server.h). A tier for refinements implements
 // RefinementStore (refinement_cache.h).
 //
-// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network, and Insert if the tier is
-// told to wait for room. The others return at once.
+// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert may block only in a
+// tier that was made to wait for room in its queue instead of dropping values. The others return at once.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ struct StoreStats : CacheStats {  // entries and bytes: approximate
   std::uint64_t damaged = 0;      // records with a wrong checksum, which were erased
   std::uint64_t written = 0;
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
-  bool on = false;            // values are found and written; false: switched off, or it can only read or only write
+  bool on = false;            // both finding and writing work; false: switched off, or only one of them works
   // For a store on a network: look-ups that timed out; look-ups that were skipped, because the store was switched off
   // or seldom has such tiles; how often it was switched off.
   std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;
@@ -82,8 +82,8 @@ class Store : public StoreBase {
   // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
 
-  // Says that no Insert will follow the Find of this key that found nothing: the build failed or was cancelled.
-  // TileTiers calls it, RefinementCache does not.
+  // Called if Find found nothing and the build then failed or was cancelled: no Insert of the key follows. A store that
+  // keeps something for this Insert releases it. TileTiers calls it, RefinementCache does not.
   virtual void GiveUp(const Key&) {}
 };
 
