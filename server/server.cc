@@ -171,9 +171,10 @@ class RunningServer final : public Server {
   }
 
   bool Stop() {
-    limits_->connections.Drain();
+    const std::chrono::milliseconds delay = DrainDelay();
+    limits_->connections.Drain(delay, DrainGrace());
     // Waits in full, also while no connection is open: balancers send requests until they have seen /readyz.
-    std::this_thread::sleep_for(DrainDelay());
+    std::this_thread::sleep_for(delay);
     const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
     limits_->connections.WaitUntilEmpty(DrainGrace());
     listener_->Close();
@@ -206,7 +207,7 @@ class RunningServer final : public Server {
   // Last, so that operators see the stop.
   void CloseAdminListener() {
     if (!admin_listener_) return;
-    admin_connections_.Drain();
+    admin_connections_.Drain(std::chrono::milliseconds(0), std::chrono::milliseconds(0));
     admin_listener_->Close();
     if (admin_connections_.WaitUntilEmpty(kLastWords)) return;
     admin_connections_.AbortAll();
@@ -282,7 +283,6 @@ class RunningServer final : public Server {
     context->options.read = {config.header_timeout, config.idle_timeout, config.min_read_rate};
     context->options.write_timeout = config.write_timeout;
     context->options.min_rate = config.min_read_rate;
-    context->options.drain_grace = config.drain_delay + DrainGrace();
     context->application = &application_;
     context->connections = &limits_->connections;
     context->transfers = &limits_->transfers;
@@ -295,7 +295,6 @@ class RunningServer final : public Server {
   // Without TLS, and not for pages of other origins.
   std::shared_ptr<const SessionContext> AdminContext() {
     auto context = std::make_shared<SessionContext>(*Context());
-    context->options.drain_grace = std::chrono::milliseconds(0);
     context->application = &admin_;
     context->connections = &admin_connections_;
     context->cors = CorsPolicy(std::vector<std::string>());

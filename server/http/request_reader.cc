@@ -16,9 +16,9 @@ BadRequest Gone() { return BadRequest{0, ""}; }
 
 RequestReader::RequestReader(Stream& stream, ReadTimeouts timeouts) : stream_(stream), timeouts_(timeouts) {}
 
-void RequestReader::EndSoon(std::chrono::milliseconds grace) {
+void RequestReader::EndSoon(Stream::Clock::time_point close_at) {
   is_ending_ = true;
-  close_at_ = std::min(close_at_, Stream::Clock::now() + grace);
+  close_at_ = std::min(close_at_, close_at);
   if (waiting_) stream_.ExpiresAt(std::min(stream_.deadline(), close_at_));
 }
 
@@ -27,17 +27,18 @@ asio::awaitable<RequestReader::HeadOutcome> RequestReader::ReadHead(Request& req
     request = FirstLineOf(Unread());
     return HeadOutcome(tl::unexpected(why));
   };
+  // RFC 9112, section 2.2: empty lines before a request are ignored. They do not begin a request.
+  const auto skip_empty_lines = [&] {
+    while (Unread().starts_with("\r\n")) Consume(2);
+  };
+  skip_empty_lines();
   std::size_t scanned = 0;
   bool begun = !Unread().empty();
   const auto timeout = now + (begun || is_first_ ? timeouts_.message : timeouts_.idle);
   stream_.ExpiresAt(begun ? timeout : std::min(timeout, close_at_));
   is_first_ = false;
   for (;;) {
-    // RFC 9112, section 2.2: empty lines before a request are ignored.
-    while (Unread().starts_with("\r\n")) {
-      Consume(2);
-      scanned = 0;
-    }
+    skip_empty_lines();
     if (const std::size_t size = TakeRepeated(Unread(), memo_, request)) {
       Consume(size);
       co_return HeadOutcome(std::in_place);
@@ -98,7 +99,8 @@ asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(const Re
   const auto begun = Stream::Clock::now();
   stream_.ExpiresAfter(timeouts_.message);
   if (request.expects_continue && text.empty() && Unread().empty()) {
-    const BufferPair interim = {asio::buffer(kContinue), asio::const_buffer()};
+    BufferPair interim = {asio::buffer(kContinue), asio::const_buffer()};
+    Skip(stream_.TakeBytesSentAhead(), interim);
     const Transfer sent = co_await stream_.WriteSome(interim);
     if (!sent) co_return tl::unexpected(Gone());
   }

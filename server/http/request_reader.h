@@ -39,9 +39,9 @@ class RequestReader {
   asio::awaitable<tl::expected<void, BadRequest>> ReadBody(const Request& request, std::string& text, std::size_t size);
 
   // Ends the connection after the request that is being served. If none is being served, or the head of its reply has
-  // promised to keep the connection, the client may send another one: the reader waits `grace` for its first byte, and
-  // then reads it.
-  void EndSoon(std::chrono::milliseconds grace = std::chrono::milliseconds(0));
+  // promised to keep the connection, the client may send another one: the reader waits until `close_at` for its first
+  // byte, and then reads it.
+  void EndSoon(Stream::Clock::time_point close_at = Stream::Clock::now());
   bool has_unread() const { return begin_ < end_; }  // a further request, or part of one
   bool is_ending() const { return is_ending_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request

@@ -15,6 +15,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
 #include <exception>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -81,7 +82,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   Phase phase() const override { return phase_.load(std::memory_order_relaxed); }
   void Evict() override { Post(&Session::EvictHere); }
-  void Drain() override { Post(&Session::DrainHere); }
+  void Drain(Clock::time_point close_at) override {
+    Post([close_at](Session& session) { session.reader_.EndSoon(close_at); });
+  }
   void Abort() override { Post(&Session::AbortHere); }
   // For another connection that needs the memory of this one's body; Evict is for one that needs its place.
   void Displace() override { Post(&Session::DisplaceHere); }
@@ -95,8 +98,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     Clock::time_point begun;  // time at the end of its head
   };
 
-  void Post(void (Session::*step)()) {
-    asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { ((*self).*step)(); });
+  template <typename Step>
+  void Post(Step step) {
+    asio::dispatch(stream_.socket().get_executor(), [self = shared_from_this(), step] { std::invoke(step, *self); });
   }
   void EvictHere() {
     hurried_ = true;
@@ -104,7 +108,6 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     if (phase() == Phase::kServes) return;                    // a request has arrived meanwhile
     if (!reader_.waiting() || served_ == 0) stream_.Reset();  // an unfinished head or handshake
   }
-  void DrainHere() { reader_.EndSoon(context_->options.drain_grace); }
   void AbortHere() {
     reader_.EndSoon();
     stream_.Reset();
@@ -139,7 +142,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
   bool SendsBody(const Response& response) const;
   asio::awaitable<bool> Reply(Response& response, bool is_answer = false);
-  asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room);
+  asio::awaitable<void> WriteRest(BufferPair& left, std::size_t total, TransferBudget::Hold& room);
   asio::awaitable<void> CloseGently();
   void Report(const Response& response, std::size_t bytes);
 
@@ -209,12 +212,12 @@ asio::awaitable<bool> Session::ServeOne() {
   admission = handler_->Admit(request, longest_wait);
   exchange_.has_valid_head = true;
   if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
+  displaced_ = has_upload_ = false;
   if (admission.delays_refusal) {
     co_await DelayRefusal();
   } else if (admission.wait.count() > 0 && !co_await WhileConnected(Sleep(admission.wait))) {
-    co_return false;
+    co_return co_await GiveUp();
   }
-  displaced_ = has_upload_ = false;
   if (admission.refusal) {
     Response& refusal = *admission.refusal;
     refusal.close = refusal.close || request.content_length > 0;  // a body may follow that nobody will read
@@ -230,8 +233,8 @@ asio::awaitable<bool> Session::ServeOne() {
   co_return co_await Reply(std::get<Response>(answer), /*is_answer=*/true);
 }
 
-// For a request whose answer nobody waits for: the client is gone, or others get the request's memory. Returns false,
-// for the caller to return: the connection must be closed.
+// For a request whose answer nobody waits for: the connection has ended, or others get the request's memory. Returns
+// false, for the caller to return: the connection must be closed.
 asio::awaitable<bool> Session::GiveUp() {
   if (displaced_) {
     co_await RefuseUpload();
@@ -440,15 +443,15 @@ asio::awaitable<bool> Session::Reply(Response& response, bool is_answer) {
   // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
-  const bool written = asio::buffer_size(left) == 0 || co_await WriteRest(left, taken, *room);
-  Report(response, body_bytes);
-  co_return options.keep_alive&& written;
+  if (asio::buffer_size(left) > 0) co_await WriteRest(left, taken, *room);
+  Report(response, body_bytes - left[1].size());
+  co_return options.keep_alive&& asio::buffer_size(left) == 0;
 }
 
-// Returns false if the client is gone, has read nothing for too long, or reads too slowly on average. `total`: bytes of
-// the reply that were written before. They count for min_rate. `room` does not count them as taken by the client,
-// because the kernel may only have buffered them.
-asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
+// Writes `left`. It keeps what was not written: the client is gone, has read nothing for too long, or reads too slowly
+// on average. `total`: bytes of the reply that were written before. They count for min_rate. `room` does not count them
+// as taken by the client, because the kernel may only have buffered them.
+asio::awaitable<void> Session::WriteRest(BufferPair& left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
   room.BeginReply();
   const auto begun = Clock::now();
@@ -460,15 +463,11 @@ asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, Tra
     }
     stream_.ExpiresAt(deadline);
     const Transfer sent = co_await stream_.WriteSome(left);
-    if (!sent) {
-      stream_.Reset();
-      co_return false;
-    }
+    if (!sent) co_return stream_.Reset();
     room.AddTaken(*sent);
     total += *sent;
     Skip(*sent, left);
   }
-  co_return true;
 }
 
 asio::awaitable<void> Session::CloseGently() {

@@ -30,8 +30,7 @@ struct SessionOptions {
   ReadTimeouts read;
   // The longest time in which the client receives no byte, and the time before min_rate applies.
   std::chrono::milliseconds write_timeout{20'000};
-  std::size_t min_rate = 4096;               // average bytes per second that a client must take; 0: any
-  std::chrono::milliseconds drain_grace{0};  // how long a draining connection waits for another request
+  std::size_t min_rate = 4096;  // average bytes per second that a client must take; 0: any
 };
 
 // Shared by all sessions, outlives them all. What the pointers refer to must outlive the sessions too.

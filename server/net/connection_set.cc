@@ -7,7 +7,7 @@
 namespace terrace::server {
 
 void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std::string& client) {
-  bool draining = false;
+  std::optional<Draining> draining;
   {
     const std::lock_guard lock(mutex_);
     auto& count = of_client_[client];  // first: a member without its count could not be removed
@@ -15,7 +15,7 @@ void ConnectionSet::Add(const std::shared_ptr<Connection>& connection, const std
     ++count;
     draining = draining_;
   }
-  if (draining) connection->Drain();
+  if (draining) connection->Drain(std::max(draining->close_at, std::chrono::steady_clock::now() + draining->grace));
 }
 
 void ConnectionSet::Remove(const Connection* connection) {
@@ -45,7 +45,7 @@ bool ConnectionSet::HasTooMany(const std::string& client) const {
 
 bool ConnectionSet::draining() const {
   const std::lock_guard lock(mutex_);
-  return draining_;
+  return draining_.has_value();
 }
 
 // Connections are called without the lock: the last reference to one may end here, and its destructor calls Remove.
@@ -98,13 +98,14 @@ bool ConnectionSet::EvictOne(const std::string& newcomer) {
 
 // Connections are told before draining() is true, so that whoever has seen it gets no reply that keeps a connection
 // open; and then those that were added meanwhile.
-void ConnectionSet::Drain() {
-  for (const auto& connection : Snapshot()) connection->Drain();
+void ConnectionSet::Drain(std::chrono::milliseconds delay, std::chrono::milliseconds grace) {
+  const auto close_at = std::chrono::steady_clock::now() + delay + grace;
+  for (const auto& connection : Snapshot()) connection->Drain(close_at);
   {
     const std::lock_guard lock(mutex_);
-    draining_ = true;
+    draining_ = {close_at, grace};
   }
-  for (const auto& connection : Snapshot()) connection->Drain();
+  for (const auto& connection : Snapshot()) connection->Drain(close_at);
 }
 
 void ConnectionSet::AbortAll() {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -30,8 +31,8 @@ class Connection {
 
   // Closes the connection. A request that is being served gets its reply first.
   virtual void Evict() = 0;
-  // Finishes the request that has begun, or that begins shortly, and closes.
-  virtual void Drain() = 0;
+  // Finishes the request that has begun, or that begins until `close_at`, and closes.
+  virtual void Drain(std::chrono::steady_clock::time_point close_at) = 0;
   virtual void Abort() = 0;
   // Refuses the current request, because others need the memory of its body.
   virtual void Displace() { Abort(); }
@@ -63,8 +64,9 @@ class ConnectionSet {
   // Returns false if no connection can be closed.
   bool EvictOne(const std::string& newcomer);
 
-  // From now on every connection ends after its current request.
-  void Drain();
+  // From now on every connection ends after its current request. One without a request ends after `delay` and `grace`;
+  // one that is added later has at least `grace` for its first request.
+  void Drain(std::chrono::milliseconds delay, std::chrono::milliseconds grace);
   void AbortAll();
 
   // Returns false if connections are left after `timeout`.
@@ -87,7 +89,11 @@ class ConnectionSet {
   std::unordered_map<const Connection*, Member> connections_;
   std::unordered_map<std::string, std::size_t> of_client_;  // connections of each that may stay
   std::uint64_t last_number_ = 0;
-  bool draining_ = false;
+  struct Draining {
+    std::chrono::steady_clock::time_point close_at;
+    std::chrono::milliseconds grace;
+  };
+  std::optional<Draining> draining_;
   std::atomic<std::uint64_t> refused_{0};
 };
 

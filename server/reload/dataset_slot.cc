@@ -88,7 +88,7 @@ DatasetSlot::DatasetSlot(config::DatasetConfig wanted, std::future<Result<tiler:
     : wanted_(std::move(wanted)),
       opening_(std::move(opening)),
       stop_opening_(std::move(stop)),
-      tried_(StampsOf(NamedFiles(wanted_))) {}
+      tried_(StampsOf(KnownFiles())) {}
 
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
 
@@ -108,10 +108,14 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
   files_.clear();  // perhaps not those of the wanted dataset
   next_file_ = 0;
   MarkStale();
-  reopen_ = is_opening();
-  if (reopen_) stop_opening_.request_stop();
+  StopOpening();
   tried_.clear();
   retry_at_ = {};
+}
+
+void DatasetSlot::StopOpening() {
+  reopen_ = is_opening();
+  stop_opening_.request_stop();
 }
 
 std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {

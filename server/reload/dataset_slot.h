@@ -57,7 +57,8 @@ class DatasetSlot {
   // Begins to open the wanted dataset if that is due. Waits until its files have not been written to for a moment.
   void OpenIfDue(const DatasetOpener& open);
 
-  void StopOpening() { stop_opening_.request_stop(); }
+  // The outcome of an opening in progress is not wanted any more.
+  void StopOpening();
 
   // Takes over an opened dataset. Returns true if there is a new one to serve.
   bool TakeOpened();

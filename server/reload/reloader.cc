@@ -138,16 +138,16 @@ void Reloader::Step(bool reload, bool check_now) {
     CheckFiles();
     next_check_ = now + kPeriod;
   }
-  if (StepOpenings()) is_published_ = false;
+  StepOpenings();
   if (!is_published_) Publish();
   ReportProblems();
   if (reload && hooks_.reloaded) hooks_.reloaded();
 }
 
 bool Reloader::IsBusy() const {
-  return config_settles_ || !leaving_.empty() || std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) {
-           return slot.is_opening() || !slot.is_current();
-         });
+  return config_settles_ || !is_published_ || !leaving_.empty() ||
+         std::any_of(slots_.begin(), slots_.end(),
+                     [](const DatasetSlot& slot) { return slot.is_opening() || !slot.is_current(); });
 }
 
 // Such datasets are tried again, also if nothing is watched.
@@ -226,11 +226,11 @@ void Reloader::CheckFiles() {
   }
 }
 
-// Returns true if there is something new to publish.
-bool Reloader::StepOpenings() {
+void Reloader::StepOpenings() {
   std::erase_if(leaving_, [](DatasetSlot& slot) { return slot.TakeOpened() || !slot.is_opening(); });
-  bool is_new = false;
-  for (DatasetSlot& slot : slots_) is_new = slot.TakeOpened() || is_new;
+  for (DatasetSlot& slot : slots_) {
+    if (slot.TakeOpened()) is_published_ = false;
+  }
   auto openings = std::count_if(slots_.begin(), slots_.end(), [](const auto& slot) { return slot.is_opening(); });
   for (DatasetSlot& slot : slots_) {
     if (openings >= kMaxOpenings) break;
@@ -238,7 +238,6 @@ bool Reloader::StepOpenings() {
     slot.OpenIfDue(hooks_.open);
     if (slot.is_opening()) ++openings;
   }
-  return is_new;
 }
 
 void Reloader::Publish() {

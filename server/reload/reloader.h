@@ -64,7 +64,7 @@ class Reloader {
   config::ConfigResult Load() const;
   void CheckConfigFile(bool is_requested);
   void Apply(config::Config next);
-  bool StepOpenings();
+  void StepOpenings();
   void Publish();
   void ReportProblems();
   bool IsBusy() const;

@@ -66,7 +66,10 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   terms.level = request.key.level;
   terms.kind = KindOfTile(key);
   terms.deadline = deadline;
-  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), terms);
+  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), find_or_build, terms);
+  // The flight may be one of the catalog before, whose files were replaced by equal ones: they have the same key.
+  const bool is_of_replaced = flight.joined && !flight.value && flight.value.error().code == ErrorCode::kChanged;
+  if (is_of_replaced) flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), terms);
   if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!flight.value) {
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);

@@ -142,6 +142,23 @@ TEST_F(Drain, ServesThroughTheDelayAlsoWithoutAConnection) {
   EXPECT_GE(std::chrono::steady_clock::now() - begun, 1s);
 }
 
+TEST_F(Drain, DoesNotWaitLongerForAConnectionThatComesLate) {
+  ServerOptions options;
+  options.config.drain_delay = 2s;
+  options.config.drain_timeout = 1s;  // the delay counted from the connection on would be longer
+  options.config.header_timeout = 60s;
+  options.drain_grace = 100ms;
+  Start(options);
+  ASSERT_EQ(Fetch(port(), "/readyz").status, 200);
+  const std::uint16_t port_then = port();
+  server_->RequestStop();
+  WaitUntilDraining(port_then);
+  std::this_thread::sleep_for(1s);
+  RawClient silent(port_then);
+  EXPECT_TRUE(server_->Wait()) << "no request was open";
+  EXPECT_TRUE(silent.Ended());
+}
+
 TEST_F(Drain, ClosesIdleConnectionsAfterTheGraceAndTakesNoNewOnes) {
   Start();
   RawClient idle(port());

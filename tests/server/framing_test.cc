@@ -142,6 +142,21 @@ TEST_F(Framing, ClosesIdleConnectionsLater) {
   EXPECT_TRUE(client.Ended());
 }
 
+TEST_F(Framing, AnEmptyLineAfterARequestDoesNotBeginTheNextOne) {
+  ServerOptions options;
+  options.config.header_timeout = 200ms;
+  options.config.idle_timeout = 10s;
+  Start(options);
+  RawClient client(port());
+  client.Send(Get("/livez") + "\r\n");
+  ASSERT_TRUE(client.Read());
+  std::this_thread::sleep_for(400ms);
+  client.Send(Get("/livez"));
+  const auto reply = client.Read();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 200);
+}
+
 TEST_F(Framing, ClosesReadersThatTakeNothing) {
   ServerOptions options;
   options.config.write_timeout = 300ms;

@@ -110,6 +110,32 @@ TEST_F(Replace, RefusesACatalogThatCannotBeServed) {
   EXPECT_EQ(Tile().body, "old");
 }
 
+// A copy of a source has the same generation, so the two catalogs have the same keys.
+TEST_F(Replace, BuildsATileAgainIfABuildOfTheCatalogBeforeFoundItsSourceChanged) {
+  std::atomic<bool> begun{false}, go_on{false};
+  options_.on_source_changed = [] {};
+  Start(CatalogOf(1, [&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    begun = true;
+    while (!go_on) std::this_thread::sleep_for(1ms);
+    return MakeError(ErrorCode::kChanged, "maui.tif was changed");
+  }));
+  RawClient early(server_->port()), late(server_->port());
+  early.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] { return begun.load(); }));
+  ASSERT_TRUE(server_->Replace(CatalogOf(1, Says("copy")), options_.config));
+  late.Send(Get("/maui/0/0/0.terrain"));
+  ASSERT_TRUE(Eventually([&] {
+    return Fetch(server_->port(), "/metrics").body.find("terrace_flights_joined_total 1") != std::string::npos;
+  }));
+  go_on = true;
+  for (RawClient* client : {&early, &late}) {
+    const auto reply = client->Read();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status, 200);
+    EXPECT_EQ(reply->body, "copy");
+  }
+}
+
 TEST_F(Replace, WaitsForTheNextCatalogWhereTheSourceHasChanged) {
   std::atomic<int> told{0};
   options_.on_source_changed = [&] { ++told; };

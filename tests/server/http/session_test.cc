@@ -26,8 +26,14 @@ class Echo : public Application {
   std::string ClientOf(const asio::ip::address&) const override { return ""; }
 
   std::chrono::milliseconds wait{0};
+  std::shared_ptr<const std::string> body;                                     // of the answers
   std::vector<std::string> targets;                                            // in the order of the answers
   std::vector<std::chrono::steady_clock::time_point> at_admission, at_answer;  // deadlines
+  struct Report {
+    int status = 0;
+    std::size_t bytes = 0;
+  };
+  std::vector<Report> reports;
 
  private:
   class Handler : public ConnectionHandler {
@@ -43,9 +49,11 @@ class Echo : public Application {
     Answer Handle(const Request& request) override {
       echo_.targets.emplace_back(request.target);
       echo_.at_answer.push_back(request.deadline);
-      return Response{};
+      Response response;
+      response.body = echo_.body;
+      return response;
     }
-    void Report(const SentReply&) override {}
+    void Report(const SentReply& reply) override { echo_.reports.push_back({reply.response.status, reply.body_bytes}); }
 
    private:
     Echo& echo_;
@@ -83,6 +91,10 @@ class Sessions : public testing::Test {
     while (echo_.targets.size() < requests && io_.run_one_for(std::chrono::seconds(10)) > 0) {
     }
   }
+  void RunUntilReported() {
+    while (echo_.reports.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+    }
+  }
   void End() {
     connections_.AbortAll();
     io_.run_for(std::chrono::seconds(10));
@@ -91,7 +103,7 @@ class Sessions : public testing::Test {
   asio::io_context io_{1};
   Echo echo_;
   ConnectionSet connections_{8};
-  TransferBudget transfers_{1 << 20};
+  TransferBudget transfers_{64 << 20};
   const std::atomic<std::chrono::milliseconds> request_time_limit_{std::chrono::seconds(10)};
   const std::shared_ptr<SessionContext> context_ = std::make_shared<SessionContext>();
 };
@@ -141,6 +153,32 @@ TEST_F(Sessions, WaitsAndTheAnswerShareTheDeadlineOfTheHead) {
     EXPECT_GT(postponed.count(), 0) << "while the body arrived";
     EXPECT_LE(postponed, taken - 2 * echo_.wait) << "waits were not counted";
   }
+}
+
+TEST_F(Sessions, ReportsTheBytesThatWereWritten) {
+  context_->options.write_timeout = std::chrono::milliseconds(100);
+  echo_.body = std::make_shared<const std::string>(std::size_t{16} << 20, 'x');
+  Ends ends(io_);
+  Ask(ends, "large", 1);
+  StartSession(std::move(ends.server), context_, "");
+  RunUntilReported();
+  ASSERT_EQ(echo_.reports.size(), 1u);
+  EXPECT_EQ(echo_.reports[0].status, 200);
+  EXPECT_GT(echo_.reports[0].bytes, 0u);
+  EXPECT_LT(echo_.reports[0].bytes, echo_.body->size()) << "nobody has read it";
+}
+
+TEST_F(Sessions, ReportsAClientThatLeavesWhileItWaitsForItsTurn) {
+  echo_.wait = std::chrono::seconds(60);
+  Ends ends(io_);
+  Ask(ends, "late", 1);
+  StartSession(std::move(ends.server), context_, "");
+  while (echo_.at_admission.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+  }
+  ends.client.close();
+  RunUntilReported();
+  ASSERT_EQ(echo_.reports.size(), 1u);
+  EXPECT_EQ(echo_.reports[0].status, 499);
 }
 
 }  // namespace

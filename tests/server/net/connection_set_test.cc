@@ -16,7 +16,7 @@ class FakeConnection : public Connection {
   explicit FakeConnection(Phase phase) : phase_(phase) {}
   Phase phase() const override { return phase_; }
   void Evict() override { evicted = true; }
-  void Drain() override {}
+  void Drain(std::chrono::steady_clock::time_point) override {}
   void Abort() override { aborted = true; }
 
   bool evicted = false, aborted = false;

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 struct FakeTransfer : Connection {
   Phase phase() const override { return Phase::kServes; }
   void Evict() override {}
-  void Drain() override {}
+  void Drain(std::chrono::steady_clock::time_point) override {}
   void Abort() override { ++aborts; }
   void Displace() override { ++displaced; }
   int aborts = 0, displaced = 0;
