@@ -23,7 +23,9 @@ if [[ -z ${SLURM_ARRAY_TASK_ID:-} ]]; then  # on the login node
   job=$(sbatch --parsable --export=ALL "$0")
   exec sbatch --dependency="afterok:$job" --array=0 --export=ALL,FINISH=1 "$0"
 fi
+# A task runs once at a time, so a lock is of a run that was ended on another node.
 if [[ -n ${FINISH:-} ]]; then
+  rm -f "$OUT/bake.lock"
   exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --finish
 fi
 if [[ -n ${SHARDS:-} ]]; then
@@ -31,6 +33,5 @@ if [[ -n ${SHARDS:-} ]]; then
 else
   shard=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN)) count=$SLURM_ARRAY_TASK_COUNT
 fi
-# A task runs once at a time, so a lock is of a run that was ended on another node.
 rm -f "$OUT/bake-$shard-of-$count.lock"
 exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --threads "${SLURM_CPUS_PER_TASK:-1}" --shard "$shard/$count"

@@ -83,11 +83,12 @@ class Proxied(unittest.TestCase):
         values = {"TERRACE_NODES": str(cls.folder / "nodes.conf"), "TERRACE_HTTP_PORT": str(cls.http_port),
                   "TERRACE_HTTPS_PORT": str(cls.port), "TERRACE_CERTIFICATES": str(certificates), "TERRACE_CACHE": str(cls.folder / "cache")}
         filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: values[match[1]], TEMPLATE.read_text())
-        # The rest of the configuration is like nginx.conf of the image, but in a temporary folder.
+        # The rest of the configuration is like nginx.conf of the image, but in a temporary folder. It has a log of its own.
         paths = "\n".join(f"  {name}_temp_path {cls.folder}/{name};" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
+        log = f"log_format main '\"$request\" \"$http_referer\"'; access_log {cls.folder}/image.log main;"
         cls.nginx_conf = cls.folder / "nginx.conf"
         cls.nginx_conf.write_text(f"daemon off; worker_processes 1; pid {cls.folder}/nginx.pid; error_log {cls.folder}/error.log;\n"
-                                  f"events {{ worker_connections 256; }}\nhttp {{\n{paths}\n{filled}\n}}\n")
+                                  f"events {{ worker_connections 256; }}\nhttp {{\n{paths}\n{log}\n{filled}\n}}\n")
         cls.nginx_log = open(cls.folder / "nginx.log", "w+")
         cls.addClassCleanup(cls.nginx_log.close)
         cls.nginx = subprocess.Popen(["nginx", "-e", cls.folder / "error.log", "-c", cls.nginx_conf], stdout=cls.nginx_log,
@@ -120,6 +121,12 @@ class Proxied(unittest.TestCase):
         check = subprocess.run(["nginx", "-t", "-e", self.folder / "error.log", "-c", self.nginx_conf], stderr=subprocess.PIPE, text=True)
         self.assertEqual(check.returncode, 0, check.stderr)
         self.assertNotIn("[warn]", check.stderr)
+
+    def test_no_log_of_nginx_has_a_token(self):
+        self.get(f"/secret/layer.json?token={TOKEN}", headers=[f"Referer: https://localhost/?token={TOKEN}"])
+        self.get(f"/secret/layer.json?token={TOKEN}", port=self.http_port, scheme="http")
+        for log in ("nginx.log", "image.log", "error.log"):
+            self.assertNotIn(TOKEN, (self.folder / log).read_text(), log)
 
     def test_connections_are_given_up_before_terrace_closes_them(self):
         upstream = re.search(r"upstream terrace \{(.*?)\n\}", TEMPLATE.read_text(), re.DOTALL)[1]

@@ -133,6 +133,11 @@ class Deploy(unittest.TestCase):
         self.assertGreater(config["drain_delay_s"], readiness["periodSeconds"] * readiness["failureThreshold"] + readiness["timeoutSeconds"])
         self.assertGreater(pod["terminationGracePeriodSeconds"], config["drain_delay_s"] + config["drain_timeout_s"] + 1)
         self.assertIn(f":{container['ports'][0]['containerPort']}", config["listen"])
+        printed = json.loads(subprocess.run([BINARY, "serve", "--print-config", "--config", ROOT / "deploy/kubernetes/terrace.json"],
+                                            check=True, stdout=subprocess.PIPE, text=True).stdout)
+        limits = [printed["cache_dir_bytes"], printed["disk_cache"]["tile_bytes"], printed["disk_cache"]["refinement_bytes"]]
+        cache = next(volume for volume in pod["volumes"] if volume["name"] == "cache")["emptyDir"]["sizeLimit"]
+        self.assertGreater(int(cache.removesuffix("Gi")) * 2**30, 1.05 * sum(limits))
         by_kind = {m["kind"]: m for m in manifests()}
         labels = by_kind["Deployment"]["spec"]["template"]["metadata"]["labels"].items()
         for selector in (by_kind["Service"]["spec"]["selector"], by_kind["PodDisruptionBudget"]["spec"]["selector"]["matchLabels"],
@@ -198,6 +203,7 @@ class Deploy(unittest.TestCase):
         subprocess.run(["bash", script], env={**environment, "SHARDS": "3", "SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_TASK_MIN": "1",
                                               "SLURM_ARRAY_TASK_COUNT": "1"}, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.assertFalse((out / "manifest.json").exists())
+        (out / "bake.lock").write_text("another-node 1 2 0f0e0d0c-0000-4000-8000-000000000000 pid:[4026531836] 0123456789abcdef\n")
         subprocess.run(["bash", script], env={**environment, "FINISH": "1", "SLURM_ARRAY_TASK_ID": "0"}, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         subprocess.run([BINARY, "bake", "--config", config, "--dataset", "jacksboro", "--out", one], check=True, stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL)
