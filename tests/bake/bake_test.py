@@ -447,6 +447,11 @@ class Bake(BakeCase):
         done = subprocess.run([BINARY, "bake", "--dry-run", "--catalogue", bad], text=True, stderr=subprocess.PIPE, timeout=60)
         self.assertEqual(done.returncode, 2)
         self.assertIn('line 2: "hello"', done.stderr)
+        for option in (["--out", self.scratch / "out"], ["--error-fraction", "0.1"], ["--vertical", "egm96"], ["--no-gzip"]):
+            done = subprocess.run([BINARY, "bake", "--dry-run", "--catalogue", catalogue, *option], text=True, stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.PIPE, timeout=60)
+            self.assertEqual(done.returncode, 2, option)
+            self.assertIn("no other option", done.stderr)
 
 
 if __name__ == "__main__":

@@ -369,10 +369,12 @@ std::string WrongTogether(const BakeArguments& arguments) {
   if (given(arguments.catalogue)) {
     if (!arguments.dry_run) return "--catalogue plans without sources: give --dry-run with it";
     if (!arguments.dems.empty() || given(arguments.config)) return "--catalogue stands for the sources; give no DEM";
-    if (arguments.format != "terrain" || given(arguments.shard) || arguments.finish || arguments.error > 0 ||
-        arguments.fraction > 0) {
-      return "--catalogue plans all terrain tiles at the default error: leave out --format, --shard, --finish, --error "
-             "and --fraction";
+    if (arguments.format != "terrain" || arguments.form != kChunks || arguments.no_gzip || arguments.finish ||
+        arguments.error > 0 || arguments.fraction > 0 || given(arguments.out) || given(arguments.update) ||
+        given(arguments.into_cache) || given(arguments.codings) || given(arguments.extensions) ||
+        given(arguments.shard) || given(arguments.queue) || given(arguments.job) || !arguments.dataset_flags.empty()) {
+      return "--catalogue plans all terrain tiles at the default error: it takes --levels, --bbox, --arc-seconds, "
+             "--bytes-per-tile, --ms-per-tile and --json, and no other option";
     }
     return {};
   }
@@ -382,10 +384,10 @@ std::string WrongTogether(const BakeArguments& arguments) {
                : "give DEMs, or a configuration with --config, not both";
   }
   if (given(arguments.into_cache)) {
-    if (given(arguments.out) || given(arguments.update) || given(arguments.queue) || arguments.finish ||
-        arguments.form != kChunks || arguments.no_gzip) {
-      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --queue, --finish and "
-             "--no-gzip";
+    if (given(arguments.out) || given(arguments.update) || given(arguments.queue) || given(arguments.job) ||
+        arguments.finish || arguments.form != kChunks || arguments.no_gzip) {
+      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --queue, --job, "
+             "--finish and --no-gzip";
     }
     if (dem::IsGdalName(arguments.into_cache)) return "--into-cache: a disk cache is a folder of this machine";
     return {};
