@@ -113,12 +113,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
       // Metadata lists the dataset's tiles below a tile.
       const int deepest = static_cast<int>(dem::TileEdits(model).AvailabilityToDepthOf(*unit.root).size()) - 1;
       for (int level = unit.root->level; level <= deepest; ++level) {
-        const geo::TileRange below = geo::TilesBelow(*unit.root, level);
-        std::vector<geo::TileRange> parts;
-        for (const geo::TileRange& range : model.Available(level)) {
-          if (const auto common = geo::Intersection(range, below); !geo::IsEmpty(common)) parts.push_back(common);
-        }
-        AddRanges(hasher, parts);
+        AddRanges(hasher, geo::RangesBelow(model.Available(level), *unit.root, level));
       }
     }
   }

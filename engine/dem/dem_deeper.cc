@@ -11,19 +11,6 @@
 #include "engine/mosaic/availability.h"
 
 namespace terrace::dem {
-namespace {
-
-// The parts of ranges of a level that lie below a tile.
-std::vector<geo::TileRange> Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
-  std::vector<geo::TileRange> parts;
-  for (const geo::TileRange& range : ranges) {
-    const geo::TileRange common = geo::Intersection(range, geo::TilesBelow(key, level));
-    if (!geo::IsEmpty(common)) parts.push_back(common);
-  }
-  return geo::Disjoint(std::move(parts));
-}
-
-}  // namespace
 
 // Lattices of deeper levels have as many cells as the deepest level of the sources, so that each is twice as fine as
 // the one above it.
@@ -61,7 +48,7 @@ std::uint64_t TileEdits::DeeperTilesHash(const geo::TileKey& key) const {
   if (const auto known = model_.KnownHash(memo_key)) return *known;
   ContentHasher hasher;
   for (int level = key.level + 1; level <= model_.info.max_level; ++level) {
-    const std::vector<geo::TileRange> tiles = Below(model_.available[static_cast<std::size_t>(level)], key, level);
+    const auto tiles = geo::RangesBelow(model_.available[static_cast<std::size_t>(level)], key, level);
     if (tiles.empty()) break;  // and none on deeper levels
     hasher.Add(std::uint64_t{tiles.size()});
     for (const geo::TileRange& range : tiles) {

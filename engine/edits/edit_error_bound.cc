@@ -50,7 +50,9 @@ void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<con
         is_partial |= is_unknown;
         if (edit.op == EditOp::kOffset) {
           difference = std::abs(edit.offset_m);
-        } else if (!is_unknown) {
+        } else if (is_unknown) {
+          difference = std::max(difference, std::abs(node->height - node->assumed_target));
+        } else {
           difference = std::max({difference, std::abs(node->height - low), std::abs(node->height - high)});
         }
         is_above |= node->height > low;

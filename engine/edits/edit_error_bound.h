@@ -9,7 +9,7 @@
 // For offsets, where t - s is constant, for carving and for raising, e is not reduced: the first term is e. For carving
 // and raising max(0, +-(s - t)) takes the place of t - s; where s - t changes its sign in the cell, w1 d is added.
 // Where a replacement has no height at a corner of the cell, or voids in it, w0 is 0, because samples may keep their
-// heights.
+// heights. At such a corner w_node is 0, and t is the assumed target, which is not s where an earlier edit changed s.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace terrace::dem {
 // Another source's heights at the nodes of a window; NaN where it has none.
 struct ReplacementHeights {
   std::vector<float> heights;
-  double error_m = 0;  // of the surface between them, to that source's samples
+  double error_m = 0;  // of the surface between them, and the heights before all edits instead of NaN, to its samples
   // By cell of the window, row by row from the south: 1 where samples of the source may be voids. Empty: nowhere.
   std::vector<std::uint8_t> void_cells = {};
 };
@@ -35,6 +35,9 @@ struct EditedNode {
   EditPlace place;
   double height = 0;  // before the edit
   double target = 0;  // NaN: unknown, the weight is 0
+  // Of a replacement with an unknown target: what stands for it in ReplacementHeights::error_m, the height before all
+  // edits.
+  double assumed_target = 0;
 };
 
 class EditErrorBound {

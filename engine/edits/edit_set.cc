@@ -119,8 +119,12 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           } else if (weight > 0) {
             target = row.TargetAt(x, place, datum.datum);
           }
-          if (converts) target -= datum.undulations[at];
-          if (errors) nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {place, values[at], target};
+          const double undulation = converts ? datum.undulations[at] : 0;
+          target -= undulation;
+          if (errors) {
+            nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {place, values[at], target,
+                                                                                  heights[at] - undulation};
+          }
           if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
         }
       }

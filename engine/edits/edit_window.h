@@ -28,7 +28,8 @@ class WindowAxes {
   struct Part {
     int first_column, last_column, first_row, last_row;
   };
-  // The nodes of all cells that the box touches, for each turn around the Earth: at most three parts.
+  // The nodes of all cells that the box touches in each turn around the Earth, from west to east: at most three parts,
+  // with columns between them.
   std::vector<Part> PartsOf(const Box& box) const {
     const auto rows = static_cast<int>(latitudes_.size()), columns = static_cast<int>(longitudes_.size());
     const bool ascends = rows < 2 || latitudes_.front() < latitudes_.back();
@@ -39,16 +40,18 @@ class WindowAxes {
     const int first_row = std::max(static_cast<int>(below - latitudes_.begin()) - 1, 0);
     const int last_row = std::min(static_cast<int>(above - latitudes_.begin()), rows - 1);
     std::vector<Part> parts;
-    int beyond = -1;  // columns of the last part
     for (const double turn : {-360.0, 0.0, 360.0}) {
       const double first = std::floor((box.min_x + turn - west_) / step_),
                    last = std::ceil((box.max_x + turn - west_) / step_);
       if (last < 0 || first > columns - 1 || first_row > last_row) continue;
-      const Part part{std::max(std::max(static_cast<int>(std::max(first, 0.0)), 0), beyond + 1),
-                      static_cast<int>(std::min(last, columns - 1.0)), first_row, last_row};
-      if (part.first_column > part.last_column) continue;
-      beyond = part.last_column;
-      parts.push_back(part);
+      const Part part{static_cast<int>(std::max(first, 0.0)), static_cast<int>(std::min(last, columns - 1.0)),
+                      first_row, last_row};
+      // Parts that adjoin are one, because the cells between them belong to both.
+      if (!parts.empty() && part.first_column <= parts.back().last_column + 1) {
+        parts.back().last_column = std::max(parts.back().last_column, part.last_column);
+      } else {
+        parts.push_back(part);
+      }
     }
     return parts;
   }

@@ -84,4 +84,10 @@ bool IsAvailable(const std::vector<std::vector<TileRange>>& available, const Til
          Contains(available[static_cast<std::size_t>(key.level)], key);
 }
 
+std::vector<TileRange> RangesBelow(const std::vector<TileRange>& ranges, const TileKey& key, int level) {
+  std::vector<TileRange> parts;
+  for (const TileRange& range : ranges) parts.push_back(Intersection(range, TilesBelow(key, level)));
+  return Disjoint(std::move(parts));
+}
+
 }  // namespace terrace::geo

@@ -22,6 +22,10 @@ constexpr TileRange TilesBelow(const TileKey& key, int level) {
   return {key.x << down, key.y << down, ((key.x + 1) << down) - 1, ((key.y + 1) << down) - 1};
 }
 
+// Returns the part of `ranges`, of tiles of `level`, that lies in `key`, as Disjoint does: it is the same however the
+// tiles are divided into ranges.
+std::vector<TileRange> RangesBelow(const std::vector<TileRange>& ranges, const TileKey& key, int level);
+
 // Returns the smallest range that contains both ranges.
 TileRange BoundingRange(const TileRange& a, const TileRange& b);
 

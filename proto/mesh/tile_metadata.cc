@@ -11,12 +11,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The part of `ranges`, of tiles of `level`, that lies in `key`.
+// The part of `ranges`, of tiles of `level`, that lies in `key`. The text depends on these tiles alone, and not on how
+// the tiles beside them divide them into ranges.
 Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
   Json below = Json::array();
-  for (const geo::TileRange& range : ranges) {
-    const geo::TileRange part = geo::Intersection(range, geo::TilesBelow(key, level));
-    if (geo::IsEmpty(part)) continue;
+  for (const geo::TileRange& part : geo::RangesBelow(ranges, key, level)) {
     below.push_back({{"startX", part.start_x}, {"startY", part.start_y}, {"endX", part.end_x}, {"endY", part.end_y}});
   }
   return below;

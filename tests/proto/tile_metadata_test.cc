@@ -49,6 +49,15 @@ TEST(TileMetadata, ListsWhatIsBelowTheTileAndNoMore) {
                                          [{"startX":4,"startY":1,"endX":4,"endY":2}]]})"));
 }
 
+// A further tile in the east divides the rows of the block below the tile.
+TEST(TileMetadata, DoesNotDependOnTilesBeside) {
+  const std::vector<std::vector<geo::TileRange>> block = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 5, 3}}};
+  std::vector<std::vector<geo::TileRange>> more = block;
+  more[2] = {{0, 0, 5, 0}, {0, 1, 6, 2}, {0, 3, 5, 3}};
+  EXPECT_EQ(EncodeTileMetadata({0, 0, 0}, more, 2), EncodeTileMetadata({0, 0, 0}, block, 2));
+  EXPECT_NE(EncodeTileMetadata({0, 1, 0}, more, 2), EncodeTileMetadata({0, 1, 0}, block, 2));
+}
+
 TEST(TileMetadata, EndsAtTheDeepestLevel) {
   EXPECT_EQ(Json::parse(EncodeTileMetadata({2, 3, 1}, kAvailable, 5)),
             Json::parse(R"({"available":[[{"startX":6,"startY":3,"endX":7,"endY":3}]]})"));
