@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "engine/edits/edit_window.h"
 #include "tests/engine/dem/edits_fixture.h"
 
 namespace terrace::dem {
@@ -93,46 +94,49 @@ TEST_F(EditErrors, CoverHeightsBetweenTheSamplesOfAReplacement) {
   EXPECT_GT(largest, 1);
 }
 
-// A replacement that no node meets, in ground that an earlier edit has changed.
+// A replacement that no node meets. An earlier edit has changed all of the tile.
 TEST_F(EditErrors, CoverAReplacementBetweenNodesInEditedGround) {
   constexpr double kPixel = 1.0 / 3600;
-  RasterSpec flat{.width = 400, .height = 400, .geo_transform = {7, kPixel, 0, 46, 0, -kPixel}};
+  RasterSpec flat{.width = 2000, .height = 2000, .geo_transform = {7, kPixel, 0, 46, 0, -kPixel}};
   flat.value = [](int, int) { return 100.0; };
   const std::string path = WriteRaster(dir_, flat, "flat.tif");
-  const int level = 9;
-  const double step = OpenOrFail(path)->LatticeOf(level).StepDegrees();
-  ASSERT_GT(step, 3 * kPixel);
-  const double west = (std::floor((7.05 + 180) / step) + 0.25) * step - 180;
-  const double south = (std::floor((45.95 + 90) / step) + 0.25) * step - 90;
-  const double fine = step / 10;
-  RasterSpec survey{.width = 5, .height = 5, .geo_transform = {west, fine, 0, south + 5 * fine, 0, -fine}};
+  const auto unedited = OpenOrFail(path);
+  ASSERT_NE(unedited, nullptr);
+  int level = unedited->max_level();
+  while (unedited->LatticeOf(level).StepDegrees() < 3 * kPixel) --level;
+  const double step = unedited->LatticeOf(level).StepDegrees(), fine = step / 10;
+  const double west = (std::floor((7.27 + 180) / step) + 0.25) * step - 180, east = west + 5 * fine;
+  const double south = (std::floor((45.72 + 90) / step) + 0.25) * step - 90, north = south + 5 * fine;
+  RasterSpec survey{.width = 5, .height = 5, .geo_transform = {west, fine, 0, north, 0, -fine}};
   survey.value = flat.value;
   WriteRaster(dir_, survey, "survey.tif");
-  const double east = west + 5 * fine, north = south + 5 * fine;
-  const std::string raised = Rectangle(R"({"op":"flatten","height":1000})", 7.01, 45.91, 7.09, 45.99);
-  const std::string replaced = Rectangle(R"({"op":"replace","source":"survey.tif"})", west, south, east, north);
   DemOptions options;
-  options.edits = {WriteEdits(dir_, raised + "," + replaced)};
+  options.edits = {
+      WriteEdits(dir_, Rectangle(R"({"op":"flatten","height":1000})", 6.5, 45, 8, 46.6) + "," +
+                           Rectangle(R"({"op":"replace","source":"survey.tif"})", west, south, east, north))};
   const auto source = OpenOrFail(path, options);
   ASSERT_NE(source, nullptr);
   EXPECT_GT(ExpectCovered(*source, {west + 2.5 * fine, south + 2.5 * fine}, level, level), 800);
 }
 
-// The window of the westernmost tiles begins a column west of 180 degrees, so the edit reaches it in two turns.
-TEST_F(EditErrors, CoverEveryColumnOfABandAroundTheEarth) {
-  constexpr double kPixel = 0.25;
-  RasterSpec earth{.width = 1440, .height = 720, .geo_transform = {-180, kPixel, 0, 90, 0, -kPixel}};
-  earth.value = [](int column, int) { return 100.0 * column; };
-  DemOptions options;
-  options.edits = {
-      WriteEdits(dir_, R"({"type":"Feature","properties":{"terrain":{"op":"flatten","height":0,"blend_m":100000}},)"
-                       R"("geometry":{"type":"Polygon","coordinates":[[[-180,0],[-60,0],[60,0],[180,0],[180,1],)"
-                       R"([60,1],[-60,1],[-180,1],[-180,0]]]}})")};
-  const auto source = OpenOrFail(WriteRaster(dir_, earth, "earth.tif"), options);
-  ASSERT_NE(source, nullptr);
-  for (double longitude = -180 + kPixel / 2; longitude < -170; longitude += kPixel) {
-    ExpectCovered(*source, {longitude, 1.375}, 0, source->max_level());
-  }
+// The window of the westernmost tiles begins a column west of 180 degrees, so the edit reaches it in two turns. The
+// cells between two parts would have no error.
+TEST(WindowAxes, HaveOnePartOfAnEditAroundTheEarth) {
+  const geo::Lattice lattice{3, 64};
+  const NodeWindow window{-1, 3 * 64 - 1, 67, 67};
+  const auto parts = WindowAxes(lattice, window).PartsOf({-180, -45, 180, 0});
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_EQ(parts[0].first_column, 0);
+  EXPECT_EQ(parts[0].last_column, 66);
+}
+
+TEST(WindowAxes, HaveTwoPartsOfAnEditThatIsInTheWindowTwice) {
+  const geo::Lattice lattice{0, 64};
+  const NodeWindow window{-1, -1, 131, 67};
+  const auto parts = WindowAxes(lattice, window).PartsOf({170, 0, 190, 10});
+  ASSERT_EQ(parts.size(), 2u);
+  EXPECT_EQ(parts[0].first_column, 0);
+  EXPECT_EQ(parts[1].last_column, 130);
 }
 
 // Inside of a polygon, whether or not its edge is blended.
