@@ -12,6 +12,7 @@ import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.
 import { Overlay } from "/viewer/overlay.js";
 import { Sky } from "/viewer/sky.js";
 import { Tiles3d } from "/viewer/tiles3d.js";
+import { Turns } from "/viewer/turns.js";
 
 // Renderers without a GPU, for which antialiasing is too slow.
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
@@ -33,7 +34,7 @@ function startTileWorker() {
 }
 
 export class Globe {
-  #latest = 0;  // number of the latest show(): of overlapping calls only the latest may set the terrain
+  #shows = new Turns();  // only the latest may set the terrain
 
   // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read.
   constructor(container, onError, onTileError) {
@@ -104,12 +105,12 @@ export class Globe {
   // go with every request. Throws a readable message if the server does not describe it.
   async show(dataset, fraction, compared, headers) {
     const url = layerUrl(dataset, fraction).replace("layer.json", "");
-    const turn = ++this.#latest;
+    const isLatest = this.#shows.begin();
     const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
     // If layer.json is missing, CesiumJS assumes an old server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
-    if (turn !== this.#latest) return;
-    provider.errorEvent.addEventListener((failure) => turn === this.#latest && this.onTileError(failure.message));
+    if (!isLatest()) return;
+    provider.errorEvent.addEventListener((failure) => isLatest() && this.onTileError(failure.message));
 
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
