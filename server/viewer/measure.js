@@ -122,6 +122,7 @@ export class Measure {
     const [eye, target] = ["eye", "target"].map((id) => Math.max(0, byId(id).valueAsNumber || 0));
     const unknown = [["observer", points[0]], ["target", points.at(-1)]].filter(([, { height }]) => height === undefined);
     if (unknown.length > 0) return this.#showNoVerdict(`the dataset has no height at the ${unknown.map(([end]) => end).join(" and the ")}`);
+    if (this.plot.points !== points) this.plot.show(points);  // not the measurement before
     try {
       const sight = await this.access.sight(this.dataset(), corners, { eye, target, refraction: kRefraction });
       if (!isLatest()) return;
