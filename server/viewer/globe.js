@@ -51,6 +51,8 @@ export class Globe {
     Object.assign(this, { onError, onTileError });
     this.contours = false;
     this.interval = 0;
+    this.loads = 0;  // how often all tiles of a view have arrived
+    this.isMoving = false;
     this.#dressScene();
     this.tiles3d = new Tiles3d(this.scene, this.material);
     this.sky = new Sky(this.scene, this.material.uniforms);
@@ -58,6 +60,8 @@ export class Globe {
     this.onClick = undefined;  // while set, gets clicked ground instead of onPick's callback
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
+    this.scene.camera.moveStart.addEventListener(() => (this.isMoving = true));
+    this.scene.camera.moveEnd.addEventListener(() => (this.isMoving = false));
     this.#awaitGround();
     this.scene.renderError.addEventListener((_, error) => onError(`Drawing stopped: ${error.message ?? error}`));
   }
@@ -92,7 +96,11 @@ export class Globe {
       this.#hideAir();
       this.scene.requestRender();
     });
-    this.scene.globe.tileLoadProgressEvent.addEventListener((queued) => queued === 0 && this.hasGround && this.adaptToCamera());
+    this.scene.globe.tileLoadProgressEvent.addEventListener((queued) => {
+      if (queued > 0) return;
+      this.loads += 1;
+      if (this.hasGround) this.adaptToCamera();
+    });
   }
 
   #renderer() {
@@ -127,18 +135,23 @@ export class Globe {
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
   }
 
-  // Lays the image of `dataset` on the ground; undefined, or without an image: none.
+  // Lays the image of `dataset` on the ground; undefined, or without an image: none. Another token may show more of it.
   async drape(dataset, headers) {
-    const wanted = dataset?.urls.imagery_geodetic;
+    const url = dataset?.urls.imagery_geodetic;
+    const wanted = url && `${url} ${headers.Authorization}`;
     if (this.draped === wanted) return;
     this.draped = wanted;
     this.scene.imageryLayers.removeAll();
     this.material.uniforms.draped = 0;
     this.scene.requestRender();
     if (!wanted) return;
-    const { addImagery } = await import("/viewer/imagery.js");
+    const part = await import("/viewer/imagery.js").catch(() => undefined);
     if (this.draped !== wanted) return;
-    addImagery(this.scene, wanted, dataset.imagery, headers, this.onTileError);
+    if (!part) {
+      this.draped = undefined;
+      return this.onTileError("The image could not be loaded: the server does not answer.");
+    }
+    part.addImagery(this.scene, url, dataset.imagery, headers, this.onTileError);
     const { longitude, latitude, width, height } = boxOf(dataset.imagery.bounds);
     const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
     Object.assign(this.material.uniforms, { draped: 1, imageBox: { x, y, z, w } });
@@ -171,10 +184,10 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // Shows the last frame as a still image until the new terrain is drawn or the camera moves.
+  // Shows the last frame as a still image until the new terrain is drawn or the camera moves. In a flight there is none.
   #drawCurtain() {
     const { canvas, globe, camera } = this.scene;
-    if (globe.terrainProvider.availability === undefined) return;
+    if (globe.terrainProvider.availability === undefined || this.isMoving) return;
     this.scene.render();
     const { width, height } = canvas;
     const curtain = Object.assign(document.createElement("canvas"), { className: "curtain", width, height });
@@ -194,6 +207,7 @@ export class Globe {
   // a dataset, or a part of it with `ground`, the height at its centre.
   lookAt(region, seconds) {
     const { camera } = this.scene;
+    camera.cancelFlight();
     const { longitude, latitude, width, height } = boxOf(region.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(region)) {
@@ -222,6 +236,7 @@ export class Globe {
 
   set camera([longitude, latitude, height, heading, pitch]) {
     const radians = CesiumMath.toRadians;
+    this.scene.camera.cancelFlight();  // setView lets it go on
     this.scene.camera.setView({
       destination: Cartesian3.fromDegrees(longitude, latitude, height),
       orientation: { heading: radians(heading), pitch: radians(pitch), roll: 0 },
