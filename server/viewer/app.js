@@ -9,13 +9,14 @@ import { fromLocalMeanTime, sunDirection } from "/viewer/sun.js";
 import { onTheme } from "/viewer/theme.js";
 import { TokenCard } from "/viewer/token_card.js";
 import { Traffic } from "/viewer/traffic.js";
+import { Turns } from "/viewer/turns.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
 import { Watch } from "/viewer/watch.js";
 
 const flightSeconds = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 2.5);
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
-const kRetryMs = 5000;  // of what is not essential
+const kRetryMs = 5000;
 const kForgetMs = 120000;  // a failure that comes later does not prolong the pause after the one before
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
@@ -27,7 +28,7 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
-                refreshing: undefined, problems: [], shown: undefined, region: undefined };
+                refreshing: undefined, retry: undefined, problems: [], shown: undefined, region: undefined };
 
 const panel = new Panel({
   dataset: (name) => choose(name),
@@ -50,6 +51,9 @@ const panel = new Panel({
   link: () => copyLink(),
   split: (share) => { globe.split = share; remember(); },
 });
+const shows = new Turns();
+const views = new Turns();  // by the address or the list of datasets
+const toolClicks = new Turns();
 const card = new TokenCard((token) => useToken(token));
 const traffic = new Traffic();
 const globe = makeGlobe();
@@ -94,6 +98,7 @@ function clearToolsOfAnother(dataset) {
 async function show() {
   const { dataset } = state;
   if (!dataset) return;
+  const isLatest = shows.begin();
   clearToolsOfAnother(dataset);
   if (dataset.isArchive) setSwitches({ ...state, tiles3d: state.tiles3d && Boolean(dataset.urls.tileset), right: undefined });
   state.hasFailed = false;
@@ -104,15 +109,31 @@ async function show() {
   try {
     globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
+    if (!isLatest()) return;
     panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
+    if (!isLatest()) return;
     state.hasFailed = true;
-    if (watch.isLost) return;
-    if (await access.isRefused(dataset.urls.layer).catch(() => false)) ask(`${dataset.name} needs a token.`);
-    else complain(`${dataset.name} could not be loaded: ${error.message ?? error}`);
+    if (watch.isLost || state.isGone) return;
+    const isRefused = await access.isRefused(dataset.urls.layer).catch(() => false);
+    if (!isLatest()) return;
+    if (isRefused) {
+      ask(`${dataset.name} needs a token.`);
+    } else {
+      complain(`${dataset.name} could not be loaded: ${error.message ?? error}`);
+      tryLater();
+    }
   }
   remember();
+}
+
+// Shows the dataset anew after a pause, unless that happens before. Each pause is longer than the one before.
+function tryLater() {
+  if (performance.now() - state.failedAt > kForgetMs) state.failures = 0;
+  state.failedAt = performance.now();
+  clearTimeout(state.retry);
+  state.retry = setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, kRetryMs * 2 ** state.failures++));
 }
 
 // The dataset list has no heights of a part of a dataset, so the server is asked for one. If another view is wanted before
@@ -193,9 +214,7 @@ function missTile(problem) {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
     const detail = traffic.problem;  // read late: CesiumJS reports a failure before `traffic` has seen the reply
     complain(detail ? `Tiles of ${state.dataset.name} cannot be read: ${detail}. The page tries again.` : problem);
-    if (performance.now() - state.failedAt > kForgetMs) state.failures = 0;
-    state.failedAt = performance.now();
-    setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
+    tryLater();
   });
 }
 
