@@ -146,6 +146,7 @@ async function lookAt(region, seconds) {
 }
 
 function choose(name) {
+  views.begin();
   state.wanted = undefined;
   state.dataset = state.datasets.find((dataset) => dataset.name === name) ?? state.datasets[0];
   state.fraction = defaultFraction(state.dataset);
@@ -338,6 +339,7 @@ function remember() {
 
 async function apply(view) {
   if (state.datasets.length === 0) return;
+  const isLatest = views.begin();
   state.refreshing ??= setInterval(refresh, 400);
   const { isNamed, dataset, fraction } = startOf(view, state.datasets);
   state.wanted = view.dataset && !isNamed ? view : undefined;
@@ -345,14 +347,15 @@ async function apply(view) {
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
-  state.region = undefined;
-  if (isNamed && view.camera) globe.camera = view.camera;
-  else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);
   setColouring(view.colouring);
   setSun(view.sun);
+  state.region = undefined;
+  if (isNamed && view.camera) globe.camera = view.camera;
+  else await lookAt(firstRegion(state.dataset), 0);
+  if (!isLatest()) return;
   await show();
-  if (!state.wanted || tellPending()) return;
+  if (!isLatest() || !state.wanted || tellPending()) return;
   if (state.moreWithToken) return ask(`${view.dataset} needs a token, or is not on this server.`);
   state.wanted = undefined;
   remember();
