@@ -148,6 +148,7 @@ async function lookAt(region, seconds) {
 function choose(name) {
   views.begin();
   state.wanted = undefined;
+  state.isGone = false;
   state.dataset = state.datasets.find((dataset) => dataset.name === name) ?? state.datasets[0];
   state.fraction = defaultFraction(state.dataset);
   lookAt(firstRegion(state.dataset), flightSeconds());
@@ -170,12 +171,20 @@ function lose(error) {
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
 }
 
-// Tells about the dataset that is waited for, if the server is preparing it; without one, about all that it prepares.
+// Tells about the dataset that is waited for, or else shown, if the server is preparing it; without one, about all that it
+// prepares.
 function tellPending() {
-  const name = state.wanted?.dataset;
-  const awaited = state.preparing.filter((pending) => (name ? pending.name === name : !state.dataset));
+  const name = state.wanted?.dataset ?? state.dataset?.name;
+  const awaited = state.preparing.filter((pending) => !name || pending.name === name);
   if (awaited.length > 0) panel.setMessage(awaited.map(pendingText).join(" "));
   return awaited.length > 0;
+}
+
+// Tells why nothing is shown.
+function tellEmpty() {
+  if (tellPending()) return;
+  if (state.moreWithToken) return ask("The datasets of this server need a token.");
+  complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
 }
 
 // The server has answered with its list. Shows a dataset that was waited for. Shows the dataset anew if it has another version, or if tiles could not be read.
@@ -183,27 +192,29 @@ function follow(wasLost) {
   const { dataset } = state;
   if (state.isRefused) card.close();
   state.isRefused = false;
+  if (wasLost) panel.setMessage(undefined);
   const isThere = state.datasets.some(({ name }) => name === state.wanted?.dataset);
   if (isThere || (!dataset && state.datasets.length > 0)) {
     panel.setMessage(undefined);
+    card.close();
     return apply(state.wanted ?? decodeView(location.hash));
   }
-  if (tellPending() && !dataset) return;
-  if (!dataset || !state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
+  if (!dataset) return wasLost ? tellEmpty() : tellPending();
+  const isPending = tellPending();
+  if (!state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
   const current = state.datasets.find(({ name }) => name === dataset.name);
   if (!current) {
     state.isGone = true;
-    return panel.setMessage(`${dataset.name} is no longer on this server. What is drawn is what it was.`);
+    if (!isPending) panel.setMessage(`${dataset.name} is no longer on this server. What is drawn is what it was.`);
+    return;
   }
   const isNew = current.version !== dataset.version;
   const isBack = state.isGone;
   state.dataset = current;
   state.isGone = false;
-  if (isNew) {
-    panel.note(`${dataset.name} has a new version.`);
-    openTool()?.refresh();
-  }
-  if (wasLost || isBack) panel.setMessage(undefined);
+  if (isNew) panel.note(`${dataset.name} has a new version.`);
+  if (isNew || wasLost) openTool()?.refresh();
+  if (isBack) panel.setMessage(undefined);
   if (isNew || isBack || (state.hasFailed && wasLost)) return show();
 }
 
@@ -343,7 +354,7 @@ async function apply(view) {
   state.refreshing ??= setInterval(refresh, 400);
   const { isNamed, dataset, fraction } = startOf(view, state.datasets);
   state.wanted = view.dataset && !isNamed ? view : undefined;
-  Object.assign(state, { dataset, fraction });
+  Object.assign(state, { dataset, fraction, isGone: false });
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
@@ -426,9 +437,7 @@ async function start() {
   }
   watch.start();
   if (state.datasets.length > 0) return apply(decodeView(location.hash));
-  if (tellPending()) return;
-  if (state.moreWithToken) return ask("The datasets of this server need a token.");
-  complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
+  tellEmpty();
 }
 
 window.terrace = { viewer: globe.widget, state, globe, traffic };
