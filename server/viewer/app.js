@@ -251,12 +251,14 @@ function setSun(text) {
 // The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
   const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
+  const isLatest = toolClicks.begin();
   let part;
   try {
     part = await import(name === "draft" ? "/viewer/draft.js" : "/viewer/measure.js");
   } catch {
-    return panel.note("The tool could not be loaded: the server does not answer.");
+    return isLatest() && panel.note("The tool could not be loaded: the server does not answer.");
   }
+  if (!isLatest()) return;
   if (name === "draft") state.draft ??= new part.Draft(options);
   else state.measure ??= new part.Measure(options);
   const [other, tool] = name === "draft" ? [state.measure, state.draft] : [state.draft, state.measure];
