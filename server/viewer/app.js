@@ -325,7 +325,7 @@ async function outlineEdits() {
   } catch (error) {
     state.editsOf = undefined;
     panel.note(`The edits could not be read: ${error.message}.`);
-    setTimeout(() => (state.labelled = undefined), kRetryMs);
+    throw error;
   }
 }
 
@@ -381,14 +381,13 @@ function refresh() {
   panel.setStats(state.drawn, traffic, isSplit ? globe.tiles3d.drawn() : undefined, state.right !== undefined);
   panel.setInterval(state.contours ? globe.interval : 0);
   panel.setActivity(globe.loading ? "loading" : "");
-  // The labels belong to one camera and one set of tiles.
-  const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${state.drawn.keys}`;
+  // The labels belong to one camera and one set of tiles. The tiles of another version have the same keys.
+  const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${globe.loads} ${state.drawn.keys}`;
   if (globe.loading) return;
   globe.lift();
   if (view === state.labelled) return;
   state.labelled = view;
-  labelContours();
-  outlineEdits();
+  Promise.all([labelContours(), outlineEdits()]).catch(() => setTimeout(() => (state.labelled = undefined), kRetryMs));
 }
 
 // Throws UnknownToken.
