@@ -390,9 +390,15 @@ function refresh() {
   Promise.all([labelContours(), outlineEdits()]).catch(() => setTimeout(() => (state.labelled = undefined), kRetryMs));
 }
 
-// Throws UnknownToken.
-async function list(token) {
-  keep(await access.list(token));
+// Throws UnknownToken. A reply to the token before does not count.
+async function list() {
+  const { token } = access;
+  try {
+    const found = await access.list();
+    if (token === access.token) keep(found);
+  } catch (error) {
+    if (token === access.token) throw error;
+  }
 }
 
 function keep({ datasets, preparing, moreWithToken }) {
@@ -402,12 +408,14 @@ function keep({ datasets, preparing, moreWithToken }) {
 }
 
 async function useToken(token) {
+  let found;
   try {
-    await list(token);
+    found = await access.list(token);
   } catch (error) {
     return ask(error instanceof UnknownToken ? "The server does not know this token." : `That failed: ${error.message}.`);
   }
   access.token = token;
+  keep(found);
   if (state.datasets.length === 0) return ask("There is no dataset for this token.");
   card.close();
   panel.setMessage(undefined);
