@@ -24,7 +24,7 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
 // "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
 // server does not have this dataset any more. `isRefused`: it does not know the token. `shown`: the name of the dataset
-// that was shown last. `region`: what the camera was told last to look at.
+// that was shown last. `region`: what the camera was told last to look at. `retry`: the timer of the next attempt.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
@@ -176,7 +176,7 @@ function lose(error) {
 function tellPending() {
   const name = state.wanted?.dataset ?? state.dataset?.name;
   const awaited = state.preparing.filter((pending) => !name || pending.name === name);
-  if (awaited.length > 0) panel.setMessage(awaited.map(pendingText).join(" "));
+  if (awaited.length > 0) panel.setMessage(awaited.map((pending) => pendingText(pending)).join(" "));
   return awaited.length > 0;
 }
 

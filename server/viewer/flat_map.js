@@ -261,7 +261,7 @@ async function listWhenThere(fail) {
   for (let list = await firstList; ; list = await access.list().catch(() => list)) {
     byId("message").hidden = true;
     if (list.datasets.length > 0 || list.preparing.length === 0) return list;
-    fail(list.preparing.map(pendingText).join(" "));
+    fail(list.preparing.map((pending) => pendingText(pending)).join(" "));
     await new Promise((resolve) => setTimeout(resolve, kPendingMs));
   }
 }

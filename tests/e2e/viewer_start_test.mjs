@@ -86,7 +86,7 @@ describe('the start of the viewer', () => {
     list = undefined;
     await says(page, 'earth is being prepared: 12 %');
     pending.earth = 57;
-    await says(page, 'earth is being prepared: 57 %');
+    await says(page, 'earth is being prepared: 57 %. It is shown as soon as it is there.');
     delete pending.earth;
     await ground(page);
     assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'earth');
