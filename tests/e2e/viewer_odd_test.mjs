@@ -140,10 +140,15 @@ describe('the viewer', () => {
   });
 
   it('keeps the camera of an address that is opened during a flight', async () => {
-    await page.evaluate(() => (terrace.globe.camera = [10.03, 45.03, 500000, 0, -90]));
-    await page.locator('#home').click();
-    await page.waitForFunction(() => terrace.globe.scene.tweens.length > 0, undefined, kWait);
-    await page.evaluate(() => (location.hash = '#dataset=level&camera=10.03,45.03,9000,0,-90'));
+    const flights = await page.evaluate(async () => {
+      terrace.globe.camera = [10.03, 45.03, 500000, 0, -90];
+      document.getElementById('home').click();
+      await new Promise((resolve) => setTimeout(resolve));
+      const { length } = terrace.globe.scene.tweens;
+      location.hash = '#dataset=level&camera=10.03,45.03,9000,0,-90';
+      return length;
+    });
+    assert.ok(flights > 0);
     await page.waitForFunction(() => terrace.globe.scene.tweens.length === 0, undefined, kWait);
     assert.equal(await page.evaluate(() => Math.round(terrace.globe.camera[2])), 9000);
   });
