@@ -242,6 +242,8 @@ describe('features of the viewer', () => {
 
   it('go on after the server was killed and started again', async () => {
     await page.evaluate(() => (window.sameDocument = true));
+    await page.locator('#tool-distance').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);
     const port = new URL(server.url).port;
     await server.stop('SIGKILL');
     await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
@@ -255,8 +257,6 @@ describe('features of the viewer', () => {
     }, undefined, kWait);
     const [bottom, top] = await boxes.jsonValue();
     assert.ok(bottom <= top, `one below the other: ${bottom}, ${top}`);
-    await page.locator('#tool-distance').click();
-    await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);
     await page.evaluate(() => [-84.3, -84.2].map((longitude) => terrace.state.measure.add({ longitude, latitude: 36.3, height: 400 })).at(-1));
     await says(/^The heights could not be read/);
     server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
