@@ -3,6 +3,7 @@
 import { take } from "/viewer/begun.js";
 
 const kKey = "terrace.token";
+export const kPatienceMs = 20000;  // for replies that the page waits for before it goes on
 const kMaxUrl = 4000;  // bytes; the server reads heads of 8 KiB
 const kMaxTiles = 50;  // for the heights of one request; the server reads at most 64
 
@@ -26,6 +27,10 @@ export class Access {
     return headersOf(this.#token);
   }
 
+  get token() {
+    return this.#token;
+  }
+
   // The token of later requests; empty: none.
   set token(token) {
     this.#token = token;
@@ -36,7 +41,7 @@ export class Access {
   // those that are not there yet.
   async list(token = this.#token) {
     if (!/^[\w.~+/=-]*$/.test(token)) throw new UnknownToken();
-    const response = await fetch("/datasets", { headers: headersOf(token) });
+    const response = await fetch("/datasets", { headers: headersOf(token), signal: AbortSignal.timeout(kPatienceMs) });
     if (response.status === 401) throw new UnknownToken();
     if (!response.ok) throw new Error(`the server answered ${response.status} to /datasets`);
     const { datasets, preparing = [], more_with_token: moreWithToken = false } = await response.json();
@@ -61,7 +66,7 @@ export class Access {
   async heightAt(dataset, longitude, latitude) {
     try {
       const url = this.heightUrl(dataset, longitude, latitude);
-      const reply = await (take(url) ?? fetch(url, { headers: this.headers }));
+      const reply = await (take(url) ?? fetch(url, { headers: this.headers, signal: AbortSignal.timeout(kPatienceMs) }));
       return reply.ok ? (await reply.json()).results[0].elevation ?? undefined : undefined;
     } catch {
       return undefined;
@@ -101,10 +106,10 @@ export class Access {
   }
 }
 
-// A sentence about a dataset of `preparing`.
-export function pendingText({ name, percent, failed }) {
+// About a dataset of `preparing`. `promise`: what happens when it is there.
+export function pendingText({ name, percent, failed }, promise = "It is shown as soon as it is there.") {
   return failed ? `${name} cannot be opened as it is now; the server's log says why.`
-    : `${name} is being prepared: ${percent} %. It is shown as soon as it is there.`;
+    : `${name} is being prepared: ${percent} %. ${promise}`;
 }
 
 // Throws what the server says is wrong.

@@ -9,13 +9,14 @@ import { fromLocalMeanTime, sunDirection } from "/viewer/sun.js";
 import { onTheme } from "/viewer/theme.js";
 import { TokenCard } from "/viewer/token_card.js";
 import { Traffic } from "/viewer/traffic.js";
+import { Turns } from "/viewer/turns.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
 import { Watch } from "/viewer/watch.js";
 
 const flightSeconds = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 2.5);
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
-const kRetryMs = 5000;  // of what is not essential
+const kRetryMs = 5000;
 const kForgetMs = 120000;  // a failure that comes later does not prolong the pause after the one before
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
@@ -23,11 +24,11 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
 // "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
 // server does not have this dataset any more. `isRefused`: it does not know the token. `shown`: the name of the dataset
-// that was shown last. `region`: what the camera was told last to look at.
+// that was shown last. `region`: what the camera was told last to look at. `retry`: the timer of the next attempt.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
-                refreshing: undefined, problems: [], shown: undefined, region: undefined };
+                refreshing: undefined, retry: undefined, problems: [], shown: undefined, region: undefined };
 
 const panel = new Panel({
   dataset: (name) => choose(name),
@@ -50,6 +51,9 @@ const panel = new Panel({
   link: () => copyLink(),
   split: (share) => { globe.split = share; remember(); },
 });
+const shows = new Turns();
+const views = new Turns();  // by the address or the list of datasets
+const toolClicks = new Turns();
 const card = new TokenCard((token) => useToken(token));
 const traffic = new Traffic();
 const globe = makeGlobe();
@@ -94,6 +98,7 @@ function clearToolsOfAnother(dataset) {
 async function show() {
   const { dataset } = state;
   if (!dataset) return;
+  const isLatest = shows.begin();
   clearToolsOfAnother(dataset);
   if (dataset.isArchive) setSwitches({ ...state, tiles3d: state.tiles3d && Boolean(dataset.urls.tileset), right: undefined });
   state.hasFailed = false;
@@ -104,15 +109,31 @@ async function show() {
   try {
     globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
+    if (!isLatest()) return;
     panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
+    if (!isLatest()) return;
     state.hasFailed = true;
-    if (watch.isLost) return;
-    if (await access.isRefused(dataset.urls.layer).catch(() => false)) ask(`${dataset.name} needs a token.`);
-    else complain(`${dataset.name} could not be loaded: ${error.message ?? error}`);
+    if (watch.isLost || state.isGone) return;
+    const isRefused = await access.isRefused(dataset.urls.layer).catch(() => false);
+    if (!isLatest()) return;
+    if (isRefused) {
+      ask(`${dataset.name} needs a token.`);
+    } else {
+      complain(`${dataset.name} could not be loaded: ${error.message ?? error}`);
+      tryLater();
+    }
   }
   remember();
+}
+
+// Shows the dataset anew after a pause, unless that happens before. Each pause is longer than the one before.
+function tryLater() {
+  if (performance.now() - state.failedAt > kForgetMs) state.failures = 0;
+  state.failedAt = performance.now();
+  clearTimeout(state.retry);
+  state.retry = setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, kRetryMs * 2 ** state.failures++));
 }
 
 // The dataset list has no heights of a part of a dataset, so the server is asked for one. If another view is wanted before
@@ -125,7 +146,9 @@ async function lookAt(region, seconds) {
 }
 
 function choose(name) {
+  views.begin();
   state.wanted = undefined;
+  state.isGone = false;
   state.dataset = state.datasets.find((dataset) => dataset.name === name) ?? state.datasets[0];
   state.fraction = defaultFraction(state.dataset);
   lookAt(firstRegion(state.dataset), flightSeconds());
@@ -148,12 +171,20 @@ function lose(error) {
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
 }
 
-// Tells about the dataset that is waited for, if the server is preparing it; without one, about all that it prepares.
+// Tells about the dataset that is waited for, or else shown, if the server is preparing it; without one, about all that it
+// prepares.
 function tellPending() {
-  const name = state.wanted?.dataset;
-  const awaited = state.preparing.filter((pending) => (name ? pending.name === name : !state.dataset));
-  if (awaited.length > 0) panel.setMessage(awaited.map(pendingText).join(" "));
+  const name = state.wanted?.dataset ?? state.dataset?.name;
+  const awaited = state.preparing.filter((pending) => !name || pending.name === name);
+  if (awaited.length > 0) panel.setMessage(awaited.map((pending) => pendingText(pending)).join(" "));
   return awaited.length > 0;
+}
+
+// Tells why nothing is shown.
+function tellEmpty() {
+  if (tellPending()) return;
+  if (state.moreWithToken) return ask("The datasets of this server need a token.");
+  complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
 }
 
 // The server has answered with its list. Shows a dataset that was waited for. Shows the dataset anew if it has another version, or if tiles could not be read.
@@ -161,27 +192,29 @@ function follow(wasLost) {
   const { dataset } = state;
   if (state.isRefused) card.close();
   state.isRefused = false;
+  if (wasLost) panel.setMessage(undefined);
   const isThere = state.datasets.some(({ name }) => name === state.wanted?.dataset);
   if (isThere || (!dataset && state.datasets.length > 0)) {
     panel.setMessage(undefined);
+    card.close();
     return apply(state.wanted ?? decodeView(location.hash));
   }
-  if (tellPending() && !dataset) return;
-  if (!dataset || !state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
+  if (!dataset) return wasLost ? tellEmpty() : tellPending();
+  const isPending = tellPending();
+  if (!state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
   const current = state.datasets.find(({ name }) => name === dataset.name);
   if (!current) {
     state.isGone = true;
-    return panel.setMessage(`${dataset.name} is no longer on this server. What is drawn is what it was.`);
+    if (!isPending) panel.setMessage(`${dataset.name} is no longer on this server. What is drawn is what it was.`);
+    return;
   }
   const isNew = current.version !== dataset.version;
   const isBack = state.isGone;
   state.dataset = current;
   state.isGone = false;
-  if (isNew) {
-    panel.note(`${dataset.name} has a new version.`);
-    openTool()?.refresh();
-  }
-  if (wasLost || isBack) panel.setMessage(undefined);
+  if (isNew) panel.note(`${dataset.name} has a new version.`);
+  if (isNew || wasLost) openTool()?.refresh();
+  if (isBack) panel.setMessage(undefined);
   if (isNew || isBack || (state.hasFailed && wasLost)) return show();
 }
 
@@ -193,9 +226,7 @@ function missTile(problem) {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
     const detail = traffic.problem;  // read late: CesiumJS reports a failure before `traffic` has seen the reply
     complain(detail ? `Tiles of ${state.dataset.name} cannot be read: ${detail}. The page tries again.` : problem);
-    if (performance.now() - state.failedAt > kForgetMs) state.failures = 0;
-    state.failedAt = performance.now();
-    setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
+    tryLater();
   });
 }
 
@@ -220,12 +251,14 @@ function setSun(text) {
 // The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
   const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
+  const isLatest = toolClicks.begin();
   let part;
   try {
     part = await import(name === "draft" ? "/viewer/draft.js" : "/viewer/measure.js");
   } catch {
-    return panel.note("The tool could not be loaded: the server does not answer.");
+    return isLatest() && panel.note("The tool could not be loaded: the server does not answer.");
   }
+  if (!isLatest()) return;
   if (name === "draft") state.draft ??= new part.Draft(options);
   else state.measure ??= new part.Measure(options);
   const [other, tool] = name === "draft" ? [state.measure, state.draft] : [state.draft, state.measure];
@@ -292,7 +325,7 @@ async function outlineEdits() {
   } catch (error) {
     state.editsOf = undefined;
     panel.note(`The edits could not be read: ${error.message}.`);
-    setTimeout(() => (state.labelled = undefined), kRetryMs);
+    throw error;
   }
 }
 
@@ -319,21 +352,23 @@ function remember() {
 
 async function apply(view) {
   if (state.datasets.length === 0) return;
+  const isLatest = views.begin();
   state.refreshing ??= setInterval(refresh, 400);
   const { isNamed, dataset, fraction } = startOf(view, state.datasets);
   state.wanted = view.dataset && !isNamed ? view : undefined;
-  Object.assign(state, { dataset, fraction });
+  Object.assign(state, { dataset, fraction, isGone: false });
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
-  state.region = undefined;
-  if (isNamed && view.camera) globe.camera = view.camera;
-  else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);
   setColouring(view.colouring);
   setSun(view.sun);
+  state.region = undefined;
+  if (isNamed && view.camera) globe.camera = view.camera;
+  else await lookAt(firstRegion(state.dataset), 0);
+  if (!isLatest()) return;
   await show();
-  if (!state.wanted || tellPending()) return;
+  if (!isLatest() || !state.wanted || tellPending()) return;
   if (state.moreWithToken) return ask(`${view.dataset} needs a token, or is not on this server.`);
   state.wanted = undefined;
   remember();
@@ -346,19 +381,24 @@ function refresh() {
   panel.setStats(state.drawn, traffic, isSplit ? globe.tiles3d.drawn() : undefined, state.right !== undefined);
   panel.setInterval(state.contours ? globe.interval : 0);
   panel.setActivity(globe.loading ? "loading" : "");
-  // The labels belong to one camera and one set of tiles.
-  const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${state.drawn.keys}`;
+  // The labels belong to one camera and one set of tiles. The tiles of another version have the same keys.
+  const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${globe.loads} ${state.drawn.keys}`;
   if (globe.loading) return;
   globe.lift();
   if (view === state.labelled) return;
   state.labelled = view;
-  labelContours();
-  outlineEdits();
+  Promise.all([labelContours(), outlineEdits()]).catch(() => setTimeout(() => (state.labelled = undefined), kRetryMs));
 }
 
-// Throws UnknownToken.
-async function list(token) {
-  keep(await access.list(token));
+// Throws UnknownToken. A reply to the token before does not count.
+async function list() {
+  const { token } = access;
+  try {
+    const found = await access.list();
+    if (token === access.token) keep(found);
+  } catch (error) {
+    if (token === access.token) throw error;
+  }
 }
 
 function keep({ datasets, preparing, moreWithToken }) {
@@ -368,12 +408,14 @@ function keep({ datasets, preparing, moreWithToken }) {
 }
 
 async function useToken(token) {
+  let found;
   try {
-    await list(token);
+    found = await access.list(token);
   } catch (error) {
     return ask(error instanceof UnknownToken ? "The server does not know this token." : `That failed: ${error.message}.`);
   }
   access.token = token;
+  keep(found);
   if (state.datasets.length === 0) return ask("There is no dataset for this token.");
   card.close();
   panel.setMessage(undefined);
@@ -404,9 +446,7 @@ async function start() {
   }
   watch.start();
   if (state.datasets.length > 0) return apply(decodeView(location.hash));
-  if (tellPending()) return;
-  if (state.moreWithToken) return ask("The datasets of this server need a token.");
-  complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
+  tellEmpty();
 }
 
 window.terrace = { viewer: globe.widget, state, globe, traffic };

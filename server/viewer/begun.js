@@ -2,8 +2,8 @@
 const begun = new Map();  // absolute URL: promise of a Response
 const absolute = (url) => new URL(url, location.href).href;
 
-export function begin(url, headers) {
-  const reply = fetch(url, { headers });
+export function begin(url, headers, signal) {
+  const reply = fetch(url, { headers, signal });
   reply.catch(() => {});  // who takes it hears of it
   begun.set(absolute(url), reply);
   return reply.then((response) => response.clone());

@@ -6,6 +6,7 @@ import {
 } from "/viewer/cesium/index.js";
 import { crossesItself, earthwork, flattenGeoJson, isBeside, placesInside, signedArea } from "/viewer/edit_shapes.js";
 import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
+import { Turns } from "/viewer/turns.js";
 
 const kSamples = 400;
 const kMaxHeight = 20000;  // metres; the server takes no others
@@ -14,7 +15,7 @@ const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
 const byId = (id) => document.getElementById(id);
 
 export class Draft {
-  #turn = 0;  // of overlapping requests only the latest is shown
+  #requests = new Turns();
   #markers = 0;
 
   // `access`: the server. `dataset()`: the shown dataset. `onMode(name)`: "draft" begins, or undefined: it ends.
@@ -97,7 +98,7 @@ export class Draft {
 
   // The corners have changed: their ground is read anew.
   async #change() {
-    const turn = ++this.#turn;
+    const isLatest = this.#requests.begin();
     const { corners } = this;
     this.ground = undefined;
     if (corners.length > 0 && !this.isHeightChosen) {
@@ -108,11 +109,11 @@ export class Draft {
     if (!this.#isPolygon) return;
     try {
       const ground = await this.access.heights(this.dataset(), placesInside(corners, kSamples));
-      if (turn !== this.#turn) return;
+      if (!isLatest()) return;
       this.ground = ground;
       this.#describe();
     } catch (error) {
-      if (turn === this.#turn) byId("draft-text").textContent = `The heights could not be read: ${error.message}.`;
+      if (isLatest()) byId("draft-text").textContent = `The heights could not be read: ${error.message}.`;
     }
   }
 

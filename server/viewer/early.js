@@ -1,6 +1,6 @@
 // What the page asks of the server before CesiumJS is loaded: the list of datasets, and of the dataset that will be shown
 // first layer.json, the tiles of level 0, and the height in the middle of the view.
-import { Access, UnknownToken } from "/viewer/access.js";
+import { Access, kPatienceMs, UnknownToken } from "/viewer/access.js";
 import { begin } from "/viewer/begun.js";
 import { defaultFraction, discOf, firstRegion } from "/viewer/framing.js";
 import { decodeView } from "/viewer/view_url.js";
@@ -46,7 +46,7 @@ async function beginView({ datasets }) {
   const region = firstRegion(dataset);
   if (region.isPart && !(isNamed && view.camera)) {
     const { longitude, latitude } = discOf(region);
-    begin(access.heightUrl(dataset, longitude, latitude), access.headers).catch(() => {});
+    begin(access.heightUrl(dataset, longitude, latitude), access.headers, AbortSignal.timeout(kPatienceMs)).catch(() => {});
   }
   await beginTiles(layerUrl(dataset, fraction), access.headers);
 }

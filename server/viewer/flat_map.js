@@ -6,9 +6,11 @@ import { heightColour, niceInterval, waterline } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
+import { Turns } from "/viewer/turns.js";
 
 const kTile = 256;
 const kPendingMs = 1500;
+const kRetryMs = 5000;  // of tiles
 const kMaxTiles = 300;  // in memory
 const kWater = [51, 115, 158];
 const kStep = 0.1;  // metres between heights of an image
@@ -106,18 +108,29 @@ class FlatMap {
     if (this.#tiles.has(key)) return this.#tiles.get(key);
     if (this.#tiles.size > kMaxTiles) this.#tiles.delete(this.#tiles.keys().next().value);
     this.#tiles.set(key, undefined);
-    this.#load(key, z, x, y, this.dataset).catch(() => {});  // a missing tile stays blank
+    this.#load(key, z, x, y, this.dataset).catch(() => setTimeout(() => {
+      if (this.#tiles.get(key)) return;
+      this.#tiles.delete(key);
+      this.draw();
+    }, kRetryMs));
     return undefined;
+  }
+
+  // The image at `url`; undefined where there is none. Throws if it may be there later.
+  async #image(url, options) {
+    const reply = await fetch(url, { headers: this.access.headers });
+    if (reply.status === 429 || reply.status >= 500) throw new Error(`the server answered ${reply.status} to ${url}`);
+    return reply.ok ? createImageBitmap(await reply.blob(), options) : undefined;
   }
 
   // The part of the dataset's image for a tile of heights; undefined where there is none.
   async #photo(z, x, y, width, dataset) {
     if (!this.imagery || !dataset.urls.imagery || z > dataset.imagery.max_level) return undefined;
     const url = `${dataset.urls.imagery.replace("tiles.json", `${z}/${x}/${y}.webp`)}?v=${dataset.version}`;
-    const reply = await fetch(url, { headers: this.access.headers });
-    if (!reply.ok) return undefined;  // outside of the image
+    const image = await this.#image(url);
+    if (!image) return undefined;
     const context = new OffscreenCanvas(width, width).getContext("2d");
-    context.drawImage(await createImageBitmap(await reply.blob()), 0, 0, width, width);
+    context.drawImage(image, 0, 0, width, width);
     return context.getImageData(0, 0, width, width);
   }
 
@@ -132,9 +145,8 @@ class FlatMap {
   async #load(key, z, x, y, dataset) {
     const { look } = this;
     const url = this.template.replace("{z}", z).replace("{x}", x).replace("{y}", y);
-    const reply = await fetch(url, { headers: this.access.headers });
-    if (!reply.ok) return;
-    const image = await createImageBitmap(await reply.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    const image = await this.#image(url, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    if (!image) return;
     const tile = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height });
     const context = tile.getContext("2d", { willReadFrequently: true });
     context.drawImage(image, 0, 0);
@@ -249,7 +261,7 @@ async function listWhenThere(fail) {
   for (let list = await firstList; ; list = await access.list().catch(() => list)) {
     byId("message").hidden = true;
     if (list.datasets.length > 0 || list.preparing.length === 0) return list;
-    fail(list.preparing.map(pendingText).join(" "));
+    fail(list.preparing.map((pending) => pendingText(pending)).join(" "));
     await new Promise((resolve) => setTimeout(resolve, kPendingMs));
   }
 }
@@ -265,7 +277,11 @@ export async function startFlatMap() {
     const { datasets, preparing, moreWithToken } = await listWhenThere(fail);
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    const shows = new Turns();
+    const clicks = new Turns();
+    // Returns whether no other dataset was wanted meanwhile.
     const show = async (name) => {
+      const isLatest = shows.begin();
       const dataset = datasets.find((candidate) => candidate.name === name) ?? datasets[0];
       byId("dataset").value = dataset.name;
       byId("readout").hidden = true;
@@ -275,7 +291,8 @@ export async function startFlatMap() {
       byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
       byId("message").hidden = true;
-      await map.show(dataset).catch(fail);
+      await map.show(dataset).catch((error) => isLatest() && fail(error));
+      return isLatest();
     };
     const named = () => new URLSearchParams(location.hash.slice(1)).get("dataset");
     byId("dataset").addEventListener("change", (event) => show(event.target.value));
@@ -285,16 +302,19 @@ export async function startFlatMap() {
     byId("home").addEventListener("click", () => show(byId("dataset").value));
     map.onPick = async (longitude, latitude) => {
       if (!map.template) return;
-      const height = await access.heightAt(map.dataset, longitude, latitude);
+      const isLatest = clicks.begin();
+      const { dataset } = map;
+      const height = await access.heightAt(dataset, longitude, latitude);
+      if (!isLatest() || dataset !== map.dataset) return;
       byId("readout").hidden = false;
       byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
     };
     const open = async () => {
       const wanted = named();
-      await show(wanted);
+      if (!await show(wanted)) return;
       if (!wanted || wanted === map.dataset.name || !byId("message").hidden) return;
       const pending = preparing.find(({ name }) => name === wanted);
-      if (pending) fail(pendingText(pending));
+      if (pending) fail(pendingText(pending, `Reload the page then; this is ${map.dataset.name}.`));
       else if (moreWithToken) fail(`${wanted} needs a token, or is not on this server; this is ${map.dataset.name}.`);
       else fail(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`);
     };

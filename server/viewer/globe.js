@@ -12,6 +12,7 @@ import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.
 import { Overlay } from "/viewer/overlay.js";
 import { Sky } from "/viewer/sky.js";
 import { Tiles3d } from "/viewer/tiles3d.js";
+import { Turns } from "/viewer/turns.js";
 
 // Renderers without a GPU, for which antialiasing is too slow.
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
@@ -33,7 +34,7 @@ function startTileWorker() {
 }
 
 export class Globe {
-  #latest = 0;  // number of the latest show(): of overlapping calls only the latest may set the terrain
+  #shows = new Turns();  // only the latest may set the terrain
 
   // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read.
   constructor(container, onError, onTileError) {
@@ -50,6 +51,8 @@ export class Globe {
     Object.assign(this, { onError, onTileError });
     this.contours = false;
     this.interval = 0;
+    this.loads = 0;  // how often all tiles of a view have arrived
+    this.isMoving = false;
     this.#dressScene();
     this.tiles3d = new Tiles3d(this.scene, this.material);
     this.sky = new Sky(this.scene, this.material.uniforms);
@@ -57,6 +60,8 @@ export class Globe {
     this.onClick = undefined;  // while set, gets clicked ground instead of onPick's callback
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
+    this.scene.camera.moveStart.addEventListener(() => (this.isMoving = true));
+    this.scene.camera.moveEnd.addEventListener(() => (this.isMoving = false));
     this.#awaitGround();
     this.scene.renderError.addEventListener((_, error) => onError(`Drawing stopped: ${error.message ?? error}`));
   }
@@ -91,7 +96,11 @@ export class Globe {
       this.#hideAir();
       this.scene.requestRender();
     });
-    this.scene.globe.tileLoadProgressEvent.addEventListener((queued) => queued === 0 && this.hasGround && this.adaptToCamera());
+    this.scene.globe.tileLoadProgressEvent.addEventListener((queued) => {
+      if (queued > 0) return;
+      this.loads += 1;
+      if (this.hasGround) this.adaptToCamera();
+    });
   }
 
   #renderer() {
@@ -104,12 +113,12 @@ export class Globe {
   // go with every request. Throws a readable message if the server does not describe it.
   async show(dataset, fraction, compared, headers) {
     const url = layerUrl(dataset, fraction).replace("layer.json", "");
-    const turn = ++this.#latest;
+    const isLatest = this.#shows.begin();
     const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
     // If layer.json is missing, CesiumJS assumes an old server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
-    if (turn !== this.#latest) return;
-    provider.errorEvent.addEventListener((failure) => turn === this.#latest && this.onTileError(failure.message));
+    if (!isLatest()) return;
+    provider.errorEvent.addEventListener((failure) => isLatest() && this.onTileError(failure.message));
 
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
@@ -126,18 +135,23 @@ export class Globe {
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
   }
 
-  // Lays the image of `dataset` on the ground; undefined, or without an image: none.
+  // Lays the image of `dataset` on the ground; undefined, or without an image: none. Another token may show more of it.
   async drape(dataset, headers) {
-    const wanted = dataset?.urls.imagery_geodetic;
+    const url = dataset?.urls.imagery_geodetic;
+    const wanted = url && `${url} ${headers.Authorization}`;
     if (this.draped === wanted) return;
     this.draped = wanted;
     this.scene.imageryLayers.removeAll();
     this.material.uniforms.draped = 0;
     this.scene.requestRender();
     if (!wanted) return;
-    const { addImagery } = await import("/viewer/imagery.js");
+    const part = await import("/viewer/imagery.js").catch(() => undefined);
     if (this.draped !== wanted) return;
-    addImagery(this.scene, wanted, dataset.imagery, headers, this.onTileError);
+    if (!part) {
+      this.draped = undefined;
+      return this.onTileError("The image could not be loaded: the server does not answer.");
+    }
+    part.addImagery(this.scene, url, dataset.imagery, headers, this.onTileError);
     const { longitude, latitude, width, height } = boxOf(dataset.imagery.bounds);
     const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
     Object.assign(this.material.uniforms, { draped: 1, imageBox: { x, y, z, w } });
@@ -170,10 +184,10 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // Shows the last frame as a still image until the new terrain is drawn or the camera moves.
+  // Shows the last frame as a still image until the new terrain is drawn or the camera moves. In a flight there is none.
   #drawCurtain() {
     const { canvas, globe, camera } = this.scene;
-    if (globe.terrainProvider.availability === undefined) return;
+    if (globe.terrainProvider.availability === undefined || this.isMoving) return;
     this.scene.render();
     const { width, height } = canvas;
     const curtain = Object.assign(document.createElement("canvas"), { className: "curtain", width, height });
@@ -193,6 +207,7 @@ export class Globe {
   // a dataset, or a part of it with `ground`, the height at its centre.
   lookAt(region, seconds) {
     const { camera } = this.scene;
+    camera.cancelFlight();
     const { longitude, latitude, width, height } = boxOf(region.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(region)) {
@@ -221,6 +236,7 @@ export class Globe {
 
   set camera([longitude, latitude, height, heading, pitch]) {
     const radians = CesiumMath.toRadians;
+    this.scene.camera.cancelFlight();  // setView lets it go on
     this.scene.camera.setView({
       destination: Cartesian3.fromDegrees(longitude, latitude, height),
       orientation: { heading: radians(heading), pitch: radians(pitch), roll: 0 },

@@ -3,6 +3,7 @@
 import { kRefraction, measurePath, seenGround } from "/viewer/ground_path.js";
 import { formatHeight, formatMetres } from "/viewer/numbers.js";
 import { ProfilePlot } from "/viewer/profile_plot.js";
+import { Turns } from "/viewer/turns.js";
 
 const kSamples = 400;
 const kTitles = { distance: "Distance", sight: "Line of sight" };
@@ -14,7 +15,7 @@ const kHints = {
 const byId = (id) => document.getElementById(id);
 
 export class Measure {
-  #turn = 0;  // of overlapping requests only the latest is shown
+  #requests = new Turns();
 
   // `access`: the server. `dataset()`: the shown dataset. `onMode(name)`: a mode begins, or undefined: it ends.
   constructor({ globe, access, dataset, onMode }) {
@@ -74,7 +75,7 @@ export class Measure {
   }
 
   #clear() {
-    ++this.#turn;
+    this.#requests.begin();  // no reply under way counts any more
     this.points = [];
     this.globe.overlay.setLine("measured", undefined);
     for (const name of ["start", "end", "place"]) this.globe.overlay.setMarker(name, undefined);
@@ -89,14 +90,14 @@ export class Measure {
     byId("dock-undo").hidden = corners.length === 0;
     byId("dock-text").textContent = kHints[mode][Math.min(1, corners.length)];
     if (corners.length < 2) return;
-    const turn = this.#turn;
+    const isLatest = this.#requests.begin();
     try {
       const points = await this.access.profile(this.dataset(), corners, kSamples);
-      if (turn !== this.#turn) return;
+      if (!isLatest()) return;
       this.points = points;
       this.#describe();
     } catch (error) {
-      if (turn === this.#turn) byId("dock-text").textContent = `The heights could not be read: ${error.message}.`;
+      if (isLatest()) byId("dock-text").textContent = `The heights could not be read: ${error.message}.`;
     }
   }
 
@@ -116,20 +117,21 @@ export class Measure {
 
   // The server has the verdict: it compares the line with all ground below it, not with samples.
   async #describeSight() {
-    const turn = ++this.#turn;
+    const isLatest = this.#requests.begin();
     const { points, corners } = this;
     const [eye, target] = ["eye", "target"].map((id) => Math.max(0, byId(id).valueAsNumber || 0));
     const unknown = [["observer", points[0]], ["target", points.at(-1)]].filter(([, { height }]) => height === undefined);
     if (unknown.length > 0) return this.#showNoVerdict(`the dataset has no height at the ${unknown.map(([end]) => end).join(" and the ")}`);
+    if (this.plot.points !== points) this.plot.show(points);  // not the measurement before
     try {
       const sight = await this.access.sight(this.dataset(), corners, { eye, target, refraction: kRefraction });
-      if (turn !== this.#turn) return;
+      if (!isLatest()) return;
       const seen = seenGround(points, eye);
       byId("dock-text").textContent = this.#textOf(sight, seen);
       this.#drawSeen(seen);
       this.plot.show(points, { seen, eye, target, isTargetSeen: sight.visible });
     } catch (error) {
-      if (turn === this.#turn) this.#showNoVerdict(error.message);
+      if (isLatest()) this.#showNoVerdict(error.message);
     }
   }
 

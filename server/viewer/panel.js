@@ -24,10 +24,14 @@ export class Panel {
       Object.assign(byId(name), { min: kCoarsest, max: kFinest, step: 1 });
       let settle;
       byId(name).addEventListener("input", (event) => {
-        const fraction = fractionOfStep(event.target.valueAsNumber);
-        this.setFraction(fraction, name);
+        const { target } = event;
+        const step = target.valueAsNumber;
+        this.setFraction(fractionOfStep(step), name);
         clearTimeout(settle);  // steps passed during a drag should not be fetched
-        settle = setTimeout(() => actions[name](fraction), 250);
+        settle = setTimeout(() => {
+          // Another dataset or switch may have moved or hidden the slider.
+          if (target.valueAsNumber === step && !target.closest(".field").hidden) actions[name](fractionOfStep(step));
+        }, 250);
       });
     }
     byId("exaggeration").addEventListener("input", (event) => {

@@ -6,6 +6,7 @@ import {
   UniformType,
 } from "/viewer/cesium/index.js";
 import { kLook, kRampWidth } from "/viewer/material.js";
+import { Turns } from "/viewer/turns.js";
 
 const kErrorRatio = 8;
 const kTexels = 4 * kRampWidth;
@@ -57,7 +58,7 @@ function makeShader() {
 }
 
 export class Tiles3d {
-  #latest = 0;  // number of the latest show() or hide(): of overlapping loads only the latest may enter the scene
+  #shows = new Turns();  // only the tileset of the latest show() or hide() may enter the scene
 
   // `material`: the terrain's; the tiles use its uniforms in every frame.
   constructor(scene, material) {
@@ -68,14 +69,14 @@ export class Tiles3d {
   // `resource`: tileset.json. If it cannot be read, throws the exception of CesiumJS. `onError` gets a sentence for
   // each tile that fails.
   async show(resource, onError) {
-    const turn = ++this.#latest;
+    const isLatest = this.#shows.begin();
     this.pending = true;
     try {
       const shader = makeShader();
       const tileset = await Cesium3DTileset.fromUrl(resource, {
         customShader: shader, splitDirection: SplitDirection.RIGHT, enableDebugWireframe: true, shadows: 0,
       });
-      if (turn !== this.#latest) return tileset.destroy();
+      if (!isLatest()) return tileset.destroy();
       this.#remove();
       tileset.tileFailed.addEventListener(({ message, url: tile }) => onError(`${tile} failed: ${message}`));
       this.shader = shader;
@@ -83,12 +84,12 @@ export class Tiles3d {
       this.copied = {};
       this.#follow();
     } finally {
-      if (turn === this.#latest) this.pending = false;
+      if (isLatest()) this.pending = false;
     }
   }
 
   hide() {
-    ++this.#latest;
+    this.#shows.begin();
     this.pending = false;
     this.#remove();
   }

@@ -31,7 +31,7 @@ export class Watch {
       const wasLost = this.isLost;
       this.isLost = false;
       this.#retryMs = kFirstRetryMs;
-      await this.onList(wasLost);
+      this.onList(wasLost);  // what it starts may wait for replies; the next list does not
     } catch (error) {
       if (!this.isLost || error.constructor !== this.#error) this.onLost(error);
       this.isLost = true;

@@ -18,6 +18,25 @@ export async function openBrowser(width, height, options = {}) {
   return { browser, page };
 }
 
+// Holds the reply to the next request for `url`. `asked` resolves when the page has sent that request. `release()` lets the
+// reply come from the server, or is given another one, and resolves when the page has had time to use it.
+export async function hold(page, url) {
+  let send, decide;
+  const asked = new Promise((resolve) => (send = resolve));
+  const decided = new Promise((resolve) => (decide = resolve));
+  await page.route(url, async (route) => {
+    send(route.request());
+    const reply = await decided;
+    await (reply ? route.fulfill(reply) : route.continue());
+  }, { times: 1 });
+  const release = async (reply) => {
+    decide(reply);
+    await (await asked).response();
+    await page.waitForTimeout(300);
+  };
+  return { asked, release };
+}
+
 // Ends what a test has started, and removes its folder.
 export async function end(browser, server, folder) {
   await browser?.close();

@@ -152,6 +152,13 @@ describe('edits in the viewer', () => {
     await page.waitForFunction(() => terrace.state.editsInView !== undefined, undefined, kWait);
     assert.equal(await page.evaluate(() => terrace.state.editsInView), 1, 'an edit around the view, without a corner in it');
     await page.evaluate((before) => (terrace.globe.camera = before), camera);
+    await page.waitForFunction(() => !terrace.globe.loading && document.querySelectorAll('.overlay .line.edit').length === 1, undefined, kWait);
+    const more = JSON.parse(fs.readFileSync(edits));
+    more.features.push({ ...more.features[1], geometry: flattenGeoJson([at(-84.2, 36.2), at(-84.19, 36.2), at(-84.19, 36.21)], 400, 0).features[0].geometry });
+    fs.writeFileSync(edits, JSON.stringify(more));
+    process.kill(server.pid, 'SIGHUP');
+    // The camera is still, and the new version has the same tiles.
+    await page.waitForFunction(() => document.querySelectorAll('.overlay .line.edit').length === 2, undefined, kWait);
     await page.locator('#edits').uncheck();
     assert.equal(await page.locator('.overlay .line.edit').count(), 0);
   });

@@ -5,7 +5,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { assertAccessible } from './axe.mjs';
-import { end, launchWithoutWebGl, openBrowser } from './browser.mjs';
+import { end, hold, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 import { measurePath, seenGround } from '../../server/viewer/ground_path.js';
 import { formatHeight, formatPosition } from '../../server/viewer/numbers.js';
@@ -175,6 +175,11 @@ describe('features of the viewer', () => {
       terrace.state.measure.add({ longitude: -84.13, latitude: 36.43, height: 400 });
       return terrace.state.measure.add({ longitude: east, latitude: 36.21, height: 400 });
     }, longitude);
+    const sight = await hold(page, '**/sight?*');
+    await look(-84.14);
+    await sight.asked;
+    assert.ok(await page.evaluate(() => terrace.state.measure.plot.points === terrace.state.measure.points), 'not the profile before');
+    await sight.release();
     await look(-83.9);  // beside the data
     await says(/^The line of sight is not known: the dataset has no height at the target\.$/);
     await page.route('**/heights?path=*', async (route) => {
@@ -237,6 +242,8 @@ describe('features of the viewer', () => {
 
   it('go on after the server was killed and started again', async () => {
     await page.evaluate(() => (window.sameDocument = true));
+    await page.locator('#tool-distance').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);
     const port = new URL(server.url).port;
     await server.stop('SIGKILL');
     await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
@@ -250,6 +257,8 @@ describe('features of the viewer', () => {
     }, undefined, kWait);
     const [bottom, top] = await boxes.jsonValue();
     assert.ok(bottom <= top, `one below the other: ${bottom}, ${top}`);
+    await page.evaluate(() => [-84.3, -84.2].map((longitude) => terrace.state.measure.add({ longitude, latitude: 36.3, height: 400 })).at(-1));
+    await says(/^The heights could not be read/);
     server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
     await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
     await page.locator('#fraction').focus();
@@ -257,6 +266,8 @@ describe('features of the viewer', () => {
     await page.waitForTimeout(500);
     await settled();
     assert.ok(await page.evaluate(() => window.sameDocument), 'without a reload');
+    await says(/straight/);
+    await page.locator('#dock-close').click();
   });
 
   it('follow a new version and tell of a dataset that is gone', async () => {

@@ -4,7 +4,7 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { end, openBrowser } from './browser.mjs';
+import { end, hold, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { run, samples, serve } from './harness.mjs';
 import { discOf, isGlobal } from '../../server/viewer/framing.js';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
@@ -109,6 +109,62 @@ describe('the viewer', () => {
     assert.ok(latitude > 85 && height > 1e5 && height < 5e5, `${latitude}, ${height} m`);
   });
 
+  const select = (name) => page.locator('#dataset').selectOption(name);
+  const saysNothing = async (of) => assert.equal(await of.locator('#message').isVisible() && await of.locator('#message').innerText(), false);
+
+  it('says nothing about a dataset that was chosen before another one', async () => {
+    await open('#dataset=level');
+    const small = await hold(page, '**/small/layer.json*');
+    await select('small');
+    await small.asked;
+    await select('deep');
+    await settled();
+    await small.release({ status: 404, body: '' });
+    await saysNothing(page);
+    assert.equal(await page.evaluate(() => terrace.state.hasFailed), false);
+  });
+
+  it('asks again for a dataset that could not be loaded, and keeps its message until then', async () => {
+    const small = await hold(page, '**/small/layer.json*');
+    await page.route('**/level/layer.json*', (route) => route.fulfill({ status: 503, body: '' }));
+    await select('small');
+    await small.asked;
+    await select('level');
+    await page.getByText('level could not be loaded').waitFor({ timeout: 90000 });
+    await small.release();
+    assert.match(await page.locator('#message').innerText(), /^level could not be loaded/);
+    await page.unroute('**/level/layer.json*');
+    await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
+    await settled();
+    assert.equal(await page.evaluate(() => terrace.globe.shownVersion === terrace.state.dataset.version), true);
+  });
+
+  it('keeps the camera of an address that is opened during a flight', async () => {
+    const flights = await page.evaluate(async () => {
+      terrace.globe.camera = [10.03, 45.03, 500000, 0, -90];
+      document.getElementById('home').click();
+      await new Promise((resolve) => setTimeout(resolve));
+      const { length } = terrace.globe.scene.tweens;
+      location.hash = '#dataset=level&camera=10.03,45.03,9000,0,-90';
+      return length;
+    });
+    assert.ok(flights > 0);
+    await page.waitForFunction(() => terrace.globe.scene.tweens.length === 0, undefined, kWait);
+    assert.equal(await page.evaluate(() => Math.round(terrace.globe.camera[2])), 9000);
+  });
+
+  it('takes the slider for the dataset that it was moved at', async () => {
+    const fraction = await page.evaluate(() => {
+      for (const [id, value, kind] of [['fraction', 10, 'input'], ['dataset', 'deep', 'change']]) {
+        document.getElementById(id).value = value;
+        document.getElementById(id).dispatchEvent(new Event(kind));
+      }
+      return terrace.state.fraction;
+    });
+    await page.waitForTimeout(400);
+    assert.equal(await page.evaluate(() => terrace.state.fraction), fraction);
+  });
+
   it('takes garbage in the address for what is nearest to it, or for nothing', async () => {
     await open('#%%%&&==&dataset&fraction=1e300&right=-1&exaggeration=1e9&split=-7&colours=plaid&sun=2026-99-99T99:99&camera=1e9,-1e9,1e99,1e9,1e9');
     const view = await page.evaluate(() => ({ fraction: terrace.state.fraction, right: terrace.state.right, sun: terrace.state.sun,
@@ -132,6 +188,14 @@ describe('the viewer', () => {
     assert.equal(await page.locator('#message').isVisible(), false);
     await page.locator('#globe').press('Enter');
     await page.getByText(/ data [\d,]+ m$/).waitFor();
+    const measuring = await hold(page, '**/viewer/measure.js');
+    await page.locator('#tool-distance').click();
+    await measuring.asked;
+    await page.locator('#tool-draft').click();
+    await page.waitForFunction(() => terrace.state.draft?.isOpen, undefined, kWait);
+    await measuring.release();
+    assert.ok(await page.evaluate(() => import('/viewer/measure.js').then(() => terrace.state.draft.isOpen && !terrace.state.measure)), 'the tool clicked last');
+    await page.locator('#draft-close').click();
     const corners = [[-84.3, 36.3], [-84.2, 36.3], [-84.2, 36.35]].map(([longitude, latitude]) => ({ longitude, latitude, height: 400 }));
     for (const [tool, count, text] of [['distance', 2, /8,982 m straight, .* up, /], ['sight', 2, /^(Visible|Hidden)/], ['draft', 3, /Raises the ground/]]) {
       await page.locator(`#tool-${tool}`).click();
@@ -147,6 +211,54 @@ describe('the viewer', () => {
     await page.locator('#draft-text').getByText(/^403\.9 km².*Raises the ground/).waitFor();  // 90 of the finest tiles
     await page.evaluate(() => terrace.state.draft.end());
     assert.deepEqual(page.wrongs, []);
+  });
+
+  it('shows on a flat map what was wanted last', async (test) => {
+    const plain = await launchWithoutWebGl();
+    test.after(() => plain.close());
+    const flat = await plain.newPage({ viewport: { width: 640, height: 400 } });
+    const drawn = (name) => flat.waitForFunction((wanted) => {
+      const canvas = document.querySelector('#globe canvas');
+      return document.getElementById('dataset').value === wanted && canvas?.width > 0 &&
+        canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0);
+    }, name, kWait);
+    const pick = (name) => flat.locator('#dataset').selectOption(name);
+    await flat.goto(`${server.url}/#dataset=level`);
+    await drawn('level');
+
+    let small = await hold(flat, /\/small\/tiles\.json/);
+    await flat.evaluate(() => (location.hash = 'dataset=small'));
+    await small.asked;
+    await pick('level');
+    await drawn('level');
+    await small.release();
+    await saysNothing(flat);
+
+    small = await hold(flat, /\/small\/tiles\.json/);
+    await pick('small');
+    await small.asked;
+    await pick('level');
+    await drawn('level');
+    await small.release({ status: 404, body: '' });
+    await saysNothing(flat);
+
+    const heights = await hold(flat, '**/level/heights*');
+    await flat.locator('#globe').press('Enter');
+    await heights.asked;
+    await flat.locator('#globe').press('ArrowRight');
+    await flat.locator('#globe').press('Enter');
+    await flat.waitForFunction(() => document.getElementById('readout').textContent.endsWith(' 2,500 m'), undefined, kWait);
+    const readout = await flat.locator('#readout').innerText();
+    await heights.release();
+    assert.equal(await flat.locator('#readout').innerText(), readout);
+
+    const isTile = /\/deep\/.*\.png/;
+    await flat.route(isTile, (route) => route.fulfill({ status: 503, body: '' }));
+    const refused = flat.waitForResponse(isTile);
+    await pick('deep');
+    await refused;
+    await flat.unroute(isTile);
+    await drawn('deep');
   });
 
   it('keeps the panel, the tools and its messages apart', async () => {

@@ -72,20 +72,28 @@ describe('the start of the viewer', () => {
   };
   const says = (page, text) => page.waitForFunction((wanted) => document.getElementById('message').textContent.includes(wanted), text, kWait);
 
-  it('tells how far the only datasets are, and begins by itself when they are there', async () => {
+  it('tells why there is nothing yet and how far the only datasets are, and begins by itself when they are there', async () => {
     const page = await newPage();
     const pending = { earth: 12, jacksboro: 0 };
     await prepare(page, pending);
+    let list = { status: 503 };
+    await page.route('**/datasets', (route) => (list ? route.fulfill(list) : route.fallback()));
     await page.goto(server.url, { waitUntil: 'commit' });
+    await says(page, 'The list of datasets could not be read');
+    list = { json: { datasets: [], more_with_token: true } };
+    await page.getByText('The datasets of this server need a token.').waitFor(kWait);
+    assert.equal(await page.locator('#message').isVisible(), false);
+    list = undefined;
     await says(page, 'earth is being prepared: 12 %');
     pending.earth = 57;
-    await says(page, 'earth is being prepared: 57 %');
+    await says(page, 'earth is being prepared: 57 %. It is shown as soon as it is there.');
     delete pending.earth;
     await ground(page);
     assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'earth');
     assert.equal(await page.locator('#message').isVisible(), false);
     assert.deepEqual(await page.locator('#dataset option').allTextContents(), ['earth', 'jacksboro (being prepared)']);
-    assert.deepEqual(await page.evaluate(() => terrace.state.problems), []);
+    assert.equal(await page.locator('#token-card').isVisible(), false);
+    assert.equal(await page.evaluate(() => terrace.state.problems.length), 1, 'the first list');
     await page.close();
   });
 
@@ -99,6 +107,11 @@ describe('the start of the viewer', () => {
     delete pending.jacksboro;
     await page.waitForFunction(() => terrace.state.dataset.name === 'jacksboro' && terrace.globe.hasGround, undefined, kWait);
     assert.equal(await page.locator('#message').isVisible(), false);
+    pending.jacksboro = 7;  // prepared anew
+    await page.evaluate(() => document.dispatchEvent(new Event('visibilitychange')));
+    await says(page, 'jacksboro is being prepared: 7 %');
+    delete pending.jacksboro;
+    await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
     await page.close();
   });
 

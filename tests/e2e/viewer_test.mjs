@@ -6,7 +6,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { assertAccessible } from './axe.mjs';
-import { chromiumPath, end, launch } from './browser.mjs';
+import { chromiumPath, end, hold, launch } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 
 // A software renderer draws a quarter of the pixels.
@@ -304,6 +304,18 @@ describe('a region of fine data on a globe', { skip: process.env.TERRACE_URL ? '
     assert.ok(isHeld, 'the page has asked for a height');
     await page.unroute(/\/mosaic\/heights/);
   });
+
+  it('keeps nothing of an address that another one has overtaken', async () => {
+    const heights = await hold(page, /\/mosaic\/heights/);
+    await page.evaluate(() => (location.hash = '#dataset=mosaic&contours&colours=slope&sun=2026-06-21T18:30'));
+    await heights.asked;
+    await page.evaluate(() => (location.hash = '#dataset=earth'));
+    await page.waitForFunction(() => terrace.globe.shownVersion === terrace.state.datasets.find(({ name }) => name === 'earth').version,
+      undefined, { timeout: kSettleMs });
+    await heights.release();
+    const { dataset, contours, colouring, sun } = await page.evaluate(() => ({ ...terrace.state, dataset: terrace.state.dataset.name }));
+    assert.deepEqual({ dataset, contours, colouring, sun }, { dataset: 'earth', contours: false, colouring: 'height', sun: undefined });
+  });
 });
 
 describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs a server of its own' : false }, () => {
@@ -335,9 +347,14 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     await page.locator('#token').fill('another-token-of-the-kind');
     await page.keyboard.press('Enter');
     await page.getByText('The server does not know this token.').waitFor({ timeout: kSettleMs });
+    const old = await hold(page, '**/datasets');  // asked for without a token
+    await page.evaluate(() => document.dispatchEvent(new Event('visibilitychange')));
+    await old.asked;
     await page.locator('#token').fill(token);
     await page.keyboard.press('Enter');
     await page.waitForFunction(() => terrace.state.dataset.name === 'hills', undefined, { timeout: kSettleMs });
+    await old.release();
+    assert.deepEqual(await page.evaluate(() => terrace.state.datasets.map(({ name }) => name).sort()), ['earth', 'hills'], 'those of the last token');
     const drawn = await settle(page);
     assert.ok(drawn.deepest > 9 && await page.locator('#token-card').isHidden());
     await page.locator('#tiles3d').check();
