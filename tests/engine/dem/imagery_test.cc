@@ -131,6 +131,27 @@ TEST(Imagery, OverviewsOfOddSidesShowThePixelsWhereTheyAre) {
   }
 }
 
+TEST(Imagery, OverviewsMayBeOnePixelHigh) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec(4);
+  spec.width = 300;
+  spec.height = 200;
+  spec.overviews = {2, 4, 8, 16, 32, 64, 128, 256};  // the last has 2 x 1 pixels
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  for (int level = kTile.level; level >= 0; --level) {
+    const int shift = kTile.level - level;
+    const auto picture = ReadOrFail(*imagery, {level, kTile.x >> shift, kTile.y >> shift}, 256);
+    ASSERT_TRUE(picture.has_value()) << level;
+    int shown = 0;
+    for (int i = 0; i < 256 * 256; ++i) {
+      const Color color = At(*picture, 0, i);
+      ASSERT_TRUE(color == kNone || color == spec.color(0, 0)) << level;
+      shown += color == kNone ? 0 : 1;
+    }
+    EXPECT_GT(shown, 0) << level;
+  }
+}
+
 TEST(Imagery, InterpolatesCoarserPixelsAcrossTiles) {
   const TempDir dir;
   ImageSpec spec = TileSpec();
