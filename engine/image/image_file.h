@@ -22,6 +22,8 @@ class ImageFile {
 
   const std::string& path() const { return path_; }
   GDALDataset& dataset() const { return *dataset_; }
+  // Of red, green and blue; a band of greys or of a palette is all three.
+  const std::array<GDALRasterBand*, 3>& bands() const { return bands_; }
   int width() const { return dataset_->GetRasterXSize(); }
   int height() const { return dataset_->GetRasterYSize(); }
 
