@@ -95,7 +95,9 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
     Place(grid, *dataset);
     dataset->GetRasterBand(1)->SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
     dataset->GetRasterBand(1)->SetUnitType("metre");
+    ForgetGdalError();  // of the CRS, which the sidecar tells
     if (WriteBand(grid, *dataset, heights, GDT_Float32) != CE_None) return CannotWrite("GTiff");
+    dataset->FlushCache(/*bAtClosing=*/false);
   }
   if (file.has_sidecar()) {
     return MakeError(
@@ -103,6 +105,7 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
         "format: GDAL cannot write EPSG:{} into a GeoTIFF; choose another crs, or another format, such as f32",
         grid.epsg);
   }
+  if (HasGdalError()) return CannotWrite("GTiff");  // compressed blocks are written when GDAL's cache is flushed
   std::string bytes = file.Bytes();
   return bytes.empty() ? Result<std::string>(CannotWrite("GTiff")) : Result<std::string>(std::move(bytes));
 }

@@ -56,6 +56,7 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
   } else {
     srs.GetLinearUnits(&unit);
   }
+  grid.counts_from_greenwich = srs.GetPrimeMeridian() == 0;
   grid.unit = unit != nullptr ? unit : "unknown unit";
   return {};
 }
@@ -200,6 +201,7 @@ Result<std::vector<GeoPosition>> GridPositions::OfRows(std::int64_t first_row, s
 }
 
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area) {
+  if (grid.is_geographic && !grid.counts_from_greenwich) return std::nullopt;
   if (grid.is_geographic) return area;  // datum shifts are far smaller than what a bbox needs
   // The edges of an area across the antimeridian or around a pole do not bound it.
   if (area.east < area.west || area.south <= -90 || area.north >= 90) return std::nullopt;

@@ -23,6 +23,7 @@ struct OutputGrid {
   std::string wkt;                                  // of the CRS
   std::string unit;                                 // of its axes: "metre", "degree"
   bool is_geographic = true;                        // x and y are degrees of longitude and latitude
+  bool counts_from_greenwich = true;                // if geographic
   double west = 0, south = 0, east = 0, north = 0;  // units of the CRS
   std::int64_t columns = 0, rows = 0;
 
@@ -63,8 +64,9 @@ class GridPositions {
 };
 
 // A box around `area` in the CRS of the grid, for messages. Geographic CRS: `area` itself, without shifts between
-// datums. Projected CRS: the box around 33 points on each side of the area; nothing if one of them has no position
-// there, or if the area crosses the antimeridian or touches a pole.
+// datums; nothing if its longitudes are not counted from Greenwich. Projected CRS: the box around 33 points on each
+// side of the area; nothing if one of them has no position there, or if the area crosses the antimeridian or touches a
+// pole.
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
 // Errors as of WriteGeoTiff: whether it can write the grid, whatever the heights are.

@@ -95,10 +95,6 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
                      path, GDALGetDataTypeName(band.GetRasterDataType()));
   }
   const std::int64_t width = dataset.GetRasterXSize(), height = dataset.GetRasterYSize();
-  if (width < 2 || height < 2) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are no surface; at least 2 x 2 are needed", path,
-                     width, height);
-  }
   if (auto fits = CheckSize(path, width, height, {kMaxSide, kMaxSamples, "a raster that is served"}); !fits)
     return fits;
   if (dataset.GetRasterCount() > kMaxBands) {
@@ -388,8 +384,12 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   }
   if (auto format = CheckRemoteFormat(*dataset, path); !format) return tl::unexpected(format.error());
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
-  // An overview need not have a mask of its own.
+  // An overview need not have a mask of its own, and may be one sample wide.
   if (overview >= 0) return dataset;
+  if (dataset->GetRasterXSize() < 2 || dataset->GetRasterYSize() < 2) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {} x {} samples are no surface; at least 2 x 2 are needed", path,
+                     dataset->GetRasterXSize(), dataset->GetRasterYSize());
+  }
   if (auto sidecars = CheckSidecarsAreRead(*dataset, path); !sidecars) return tl::unexpected(sidecars.error());
   return dataset;
 }

@@ -12,9 +12,9 @@
 namespace terrace::dem {
 
 // Opens `path` read-only. Errors, with the remedy: the source policy does not allow the name, the file is not a raster,
-// is remote and not a GeoTIFF, has no band, has complex samples, or is too large: more than 2^22 samples on a side,
-// 2^36 samples, 4,096 bands or 128 MiB in a storage block. `overview`: number of an overview to open instead of the
-// full raster; -1: the full raster.
+// is remote and not a GeoTIFF, has no band, has complex samples, has fewer than 2 x 2 samples, or is too large: more
+// than 2^22 samples on a side, 2^36 samples, 4,096 bands or 128 MiB in a storage block. `overview`: number of an
+// overview to open instead of the full raster, of any size; -1: the full raster.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
 // Reads a rectangle of a band as `type`, row by row from the north, without rescaling. False: it cannot be read;

@@ -96,6 +96,23 @@ std::string WhyOverviewsLackMasks(GDALRasterBand& band) {
   return {};
 }
 
+std::string WhyOverviewsHaveOtherNodata(GDALRasterBand& band) {
+  const std::optional<double> declared = DeclaredNodata(band);
+  const bool compare_as_float = band.GetRasterDataType() == GDT_Float32;
+  const auto is_declared = [&](const std::optional<double>& stated) {
+    if (!stated || !declared) return stated == declared;
+    if (std::isnan(*stated) || std::isnan(*declared)) return std::isnan(*stated) && std::isnan(*declared);
+    return *stated == *declared || (compare_as_float && static_cast<float>(*stated) == static_cast<float>(*declared));
+  };
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr || is_declared(DeclaredNodata(*overview))) continue;
+    return "they state another nodata value than the raster, or none, as if they were made before it stated its nodata "
+           "value; make them anew with `gdaladdo -clean file` and `gdaladdo -r average file`";
+  }
+  return {};
+}
+
 std::optional<double> MetresPerUnit(const std::string& unit) {
   if (unit.empty()) return 1;
   std::string name;

@@ -70,6 +70,10 @@ std::string AttributeOfDepths(GDALRasterBand& band);
 // Empty: they are hidden there too, or nothing is hidden.
 std::string WhyOverviewsLackMasks(GDALRasterBand& band);
 
+// Returns why samples that the nodata value of a band hides are in its overviews, with the remedy: an overview states
+// another value, or none. Empty: all state that of the band.
+std::string WhyOverviewsHaveOtherNodata(GDALRasterBand& band);
+
 // Returns metres per unit for a unit name, 1 for an empty one; nothing if the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 

@@ -77,10 +77,17 @@ Result<void> ImageFile::ReadPalette(const GDALColorTable& table) {
   return {};
 }
 
-// Files may declare 0 as nodata per band, but black is a colour: a pixel is missing only if all of its bands are.
+// Files may declare 0 as nodata per band, but black is a colour: a pixel is missing only if all of its bands are. The
+// alpha band counts beside these masks, because GDAL prefers a nodata value or a mask to it.
 void ImageFile::FindMasks() {
+  for (int i = 1; i <= dataset_->GetRasterCount(); ++i) {
+    GDALRasterBand* const band = dataset_->GetRasterBand(i);
+    if (alpha_ == nullptr && band->GetColorInterpretation() == GCI_AlphaBand) alpha_ = band;
+  }
   for (GDALRasterBand* const band : bands_) {
-    if ((band->GetMaskFlags() & GMF_ALL_VALID) != 0) {
+    const int flags = band->GetMaskFlags();
+    const bool has_only_alpha = alpha_ != nullptr && (flags & GMF_ALPHA) != 0;
+    if ((flags & GMF_ALL_VALID) != 0 || has_only_alpha) {
       masks_.clear();
       return;
     }
@@ -136,6 +143,11 @@ bool ImageFile::ReadMasks(int col, int row, int cols, int rows, Rgba* out) {
     for (std::size_t k = 0; k < levels_.size(); ++k) {
       if (levels_[k] != 0) out[k][3] = 255;
     }
+  }
+  if (alpha_ == nullptr) return true;
+  if (!ReadRaw(*alpha_, col, row, cols, rows, GDT_UInt16, levels_.data())) return false;
+  for (std::size_t k = 0; k < levels_.size(); ++k) {
+    if (levels_[k] == 0) out[k][3] = 0;
   }
   return true;
 }

@@ -22,6 +22,8 @@ class ImageFile {
 
   const std::string& path() const { return path_; }
   GDALDataset& dataset() const { return *dataset_; }
+  // Of red, green and blue; a band of greys or of a palette is all three.
+  const std::array<GDALRasterBand*, 3>& bands() const { return bands_; }
   int width() const { return dataset_->GetRasterXSize(); }
   int height() const { return dataset_->GetRasterYSize(); }
 
@@ -42,6 +44,7 @@ class ImageFile {
   std::array<GDALRasterBand*, 3> bands_{};  // three equal pointers: grey or palette
   std::vector<Rgba> palette_;               // by index; empty: no palette
   std::vector<GDALRasterBand*> masks_;      // a pixel is valid if one of them says so; empty: all are valid
+  GDALRasterBand* alpha_ = nullptr;         // a valid pixel is hidden where it is 0; null: none is hidden
   std::vector<std::uint16_t> levels_;       // of one band and window
 };
 

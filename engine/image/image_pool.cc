@@ -1,5 +1,6 @@
 #include "engine/image/image_pool.h"
 
+#include <string>
 #include <utility>
 
 #include "engine/common/source_log.h"
@@ -8,11 +9,22 @@
 #include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
+namespace {
+
+std::string WhyOverviewsMislead(const ImageFile& image) {
+  if (std::string why = WhyOverviewsLackMasks(*image.dataset().GetRasterBand(1)); !why.empty()) return why;
+  for (GDALRasterBand* const band : image.bands()) {
+    if (std::string why = WhyOverviewsHaveOtherNodata(*band); !why.empty()) return why;
+  }
+  return {};
+}
+
+}  // namespace
 
 ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()), files_(std::move(files)) {
   GDALRasterBand& band = *image.dataset().GetRasterBand(1);
   sizes_.push_back(std::make_unique<Size>());
-  const std::string why = WhyOverviewsLackMasks(band);
+  const std::string why = WhyOverviewsMislead(image);
   if (!why.empty()) LogSource(SourceLog::Level::kWarn, path_, "its overviews are not used: {}", why);
   for (const int factor : why.empty() ? OverviewFactors(band) : std::vector<int>()) {
     GDALRasterBand* const wanted = FindOverview(band, factor);

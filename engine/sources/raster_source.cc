@@ -43,18 +43,6 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
   return WhyOverviewsLackMasks(band);
 }
 
-// Whether an overview was made while the file stated another nodata value, or none: then it has averaged voids.
-bool HaveOtherNodata(GDALRasterBand& band, double declared, const SampleRules& rules) {
-  for (int i = 0; i < band.GetOverviewCount(); ++i) {
-    GDALRasterBand* const overview = band.GetOverview(i);
-    if (overview == nullptr) continue;
-    const auto stated = DeclaredNodata(*overview);
-    const bool is_same = stated && (rules.IsSame(*stated, declared) || (std::isnan(*stated) && std::isnan(declared)));
-    if (!is_same) return true;
-  }
-  return false;
-}
-
 // Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
 // file and the configuration, and those whose size is not that of a grid of averages. Returns the reason, with the
 // remedy, for people; empty if nothing was removed.
@@ -83,10 +71,8 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics
     why =
         "they were made of voids too, which are not declared; declare them in a copy with "
         "`gdal_translate -a_nodata -32768 in out` and make its overviews";
-  } else if (declared && HaveOtherNodata(HeightBand(dataset), *declared, layout.rules)) {
-    why =
-        "they were made of voids too, before the raster stated its nodata value; make them anew with `gdaladdo -clean "
-        "file` and `gdaladdo -r average file`";
+  } else if (std::string other = WhyOverviewsHaveOtherNodata(HeightBand(dataset)); declared && !other.empty()) {
+    why = std::move(other);
   } else if (statistics.has_stray_overviews && layout.rules.has_mask) {
     why =
         "they have heights that the raster has not there, as if they were made without its mask; copy it with "

@@ -85,11 +85,12 @@ Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds, 
   return clipped;
 }
 
-// The size of a window in 64 bits: levels too fine for meshing have counts beyond int.
+// The size of a window in 64 bits: levels too fine for meshing have counts beyond int, and more samples than 64 bits
+// can count.
 struct NodeCounts {
   std::int64_t west = 0, south = 0, columns = 0, rows = 0;
 
-  std::int64_t samples() const { return columns * rows; }
+  double samples() const { return static_cast<double>(columns) * static_cast<double>(rows); }
   dem::NodeWindow Window() const { return {west, south, static_cast<int>(columns), static_cast<int>(rows)}; }
 };
 
@@ -108,7 +109,7 @@ NodeCounts NodesAt(const geo::Lattice& lattice, const AreaRequest& area) {
 // The limits that a number of nodes exceeds, for a message; empty: none.
 std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
   std::string limits;
-  if (static_cast<std::uint64_t>(nodes.samples()) > max_samples) {
+  if (nodes.samples() > static_cast<double>(max_samples)) {
     limits = fmt::format("more than max_mesh_samples of this server ({})", max_samples);
   }
   if (std::max(nodes.columns, nodes.rows) > tin::HeightField::kMaxSide) {
@@ -125,7 +126,7 @@ tl::unexpected<Error> TooLarge(const dem::ElevationModel& model, double error_fr
   int fitting = level - 1;
   while (fitting >= 0 && !ExceededLimits(nodes_at(fitting), max_samples).empty()) --fitting;
   const NodeCounts nodes = nodes_at(fitting >= 0 ? level : 0);
-  const std::string size = fmt::format("this area has {} x {} = {} samples, {}", nodes.columns, nodes.rows,
+  const std::string size = fmt::format("this area has {} x {} = {:.0f} samples, {}", nodes.columns, nodes.rows,
                                        nodes.samples(), ExceededLimits(nodes, max_samples));
   if (fitting < 0) {
     return MakeError(ErrorCode::kInvalidArgument, "even at the largest error {}; ask for a smaller bbox", size);

@@ -70,6 +70,19 @@ TEST(GridFile, HasAllNodesOfABoxOfWholeSteps) {
   }
 }
 
+// Longitudes of EPSG:4813 are counted from Jakarta, those of EPSG:4258 from Greenwich.
+TEST(GridFile, BoundsInDegreesNeedLongitudesFromGreenwich) {
+  GridRequest request{.epsg = 4813, .west = 0, .south = -7, .east = 1, .north = -6, .columns = 2, .rows = 2};
+  const auto jakarta = PlanOutputGrid(request, 100);
+  ASSERT_TRUE(jakarta) << jakarta.error().message;
+  EXPECT_FALSE(BoundsInCrs(*jakarta, {106, -7, 108, -6}));
+  request.epsg = 4258;
+  const auto greenwich = PlanOutputGrid(request, 100);
+  ASSERT_TRUE(greenwich) << greenwich.error().message;
+  ASSERT_TRUE(BoundsInCrs(*greenwich, {106, -7, 108, -6}));
+  EXPECT_EQ(BoundsInCrs(*greenwich, {106, -7, 108, -6})->west, 106);
+}
+
 // EPSG:3411 is on an ellipsoid of its own, its successor 3413 on that of WGS 84: up to 57 m apart.
 TEST(GridFile, OfADeprecatedSystemIsReadAsThatSystem) {
   const auto plan = PlanOutputGrid(

@@ -1,5 +1,6 @@
 #include "engine/image/imagery.h"
 
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 #include <ogr_spatialref.h>
@@ -12,6 +13,7 @@
 
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/dem/source_fixture.h"
 
 namespace terrace::dem {
 namespace {
@@ -131,6 +133,27 @@ TEST(Imagery, OverviewsOfOddSidesShowThePixelsWhereTheyAre) {
   }
 }
 
+TEST(Imagery, OverviewsMayBeOnePixelHigh) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec(4);
+  spec.width = 300;
+  spec.height = 200;
+  spec.overviews = {2, 4, 8, 16, 32, 64, 128, 256};  // the last has 2 x 1 pixels
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  for (int level = kTile.level; level >= 0; --level) {
+    const int shift = kTile.level - level;
+    const auto picture = ReadOrFail(*imagery, {level, kTile.x >> shift, kTile.y >> shift}, 256);
+    ASSERT_TRUE(picture.has_value()) << level;
+    int shown = 0;
+    for (int i = 0; i < 256 * 256; ++i) {
+      const Color color = At(*picture, 0, i);
+      ASSERT_TRUE(color == kNone || color == spec.color(0, 0)) << level;
+      shown += color == kNone ? 0 : 1;
+    }
+    EXPECT_GT(shown, 0) << level;
+  }
+}
+
 TEST(Imagery, InterpolatesCoarserPixelsAcrossTiles) {
   const TempDir dir;
   ImageSpec spec = TileSpec();
@@ -174,6 +197,46 @@ TEST(Imagery, HasNothingForTilesThatItDoesNotShow) {
   EXPECT_FALSE(ReadOrFail(*imagery, {6, 3, 3}, 256).has_value());
   EXPECT_FALSE(ReadOrFail(*imagery, {7, 130, 65}, 256).has_value()) << "no data alone";
   EXPECT_TRUE(ReadOrFail(*imagery, {7, 131, 65}, 256).has_value());
+}
+
+// Overviews state the nodata value of the time when they were made.
+TEST(Imagery, OverviewsThatStateAnotherNodataValueAreNotUsed) {
+  constexpr int kNodata = 9, kNoValue = -1;
+  for (const bool are_inside : {true, false}) {
+    for (const auto& [before, after] : {std::pair{kNodata, kNodata}, {kNoValue, kNodata}, {kNodata, kNoValue}}) {
+      SCOPED_TRACE(fmt::format("{} nodata {} then {}", are_inside ? "inside" : "beside", before, after));
+      const TempDir dir;
+      ImageSpec spec = TileSpec(4);
+      spec.nodata = before;
+      spec.color = [](int column, int) { return column < 512 ? Color{9, 9, 9} : Color{200, 100, 50}; };
+      const std::string path = WriteImage(dir, spec);
+      {
+        const GDALDatasetUniquePtr dataset(
+            GDALDataset::Open(path.c_str(), are_inside ? GDAL_OF_RASTER | GDAL_OF_UPDATE : GDAL_OF_RASTER));
+        const std::array<int, 2> factors = {2, 4};
+        ASSERT_EQ(dataset->BuildOverviews("AVERAGE", 2, factors.data(), 0, nullptr, GDALDummyProgress, nullptr),
+                  CE_None);
+      }
+      if (before != after) {
+        const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+        for (int band = 1; band <= 3; ++band) {
+          if (after == kNoValue) dataset->GetRasterBand(band)->DeleteNoDataValue();
+          if (after != kNoValue) dataset->GetRasterBand(band)->SetNoDataValue(after);
+        }
+      }
+      std::unique_ptr<Imagery> imagery;
+      const std::string log = LogOf([&] { imagery = OpenImage(path); });
+      EXPECT_EQ(log.find("overviews are not used: they state another nodata value") != std::string::npos,
+                before != after)
+          << log;
+      for (const geo::TileKey& key : {kTile, geo::TileKey{8, 65 * 4, 32 * 4}}) {  // an overview, and the full image
+        const auto picture = ReadOrFail(*imagery, key, 256);
+        const Color hidden = after == kNoValue ? Color{9, 9, 9} : kNone;
+        EXPECT_EQ(picture ? At(*picture, 128, 64) : kNone, hidden) << geo::ToString(key);
+      }
+      EXPECT_EQ(At(*ReadOrFail(*imagery, kTile, 256), 128, 192), (Color{200, 100, 50}));
+    }
+  }
 }
 
 TEST(Imagery, HasFewerPixelsWhereTheImageHasNoMore) {

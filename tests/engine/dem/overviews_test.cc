@@ -8,8 +8,8 @@
 
 #include "engine/crs/level_plan.h"
 #include "engine/raster/raster_layout.h"
-#include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/dem/source_fixture.h"
 
 namespace terrace::dem {
 namespace {
@@ -27,12 +27,6 @@ RasterSpec RampSpec(int width, int height, int west = 0) {
   spec.geo_transform = {10 + (west - .5) * kPixel, kPixel, 0, 47 + .5 * kPixel, 0, -kPixel};
   spec.value = [west](int column, int row) { return Ramp(west + column, row); };
   return spec;
-}
-
-std::unique_ptr<RasterSource> OpenRasterOrFail(const std::string& path) {
-  auto source = RasterSource::Open(path, {}, {});
-  EXPECT_TRUE(source.has_value()) << source.error().message;
-  return source ? *std::move(source) : nullptr;
 }
 
 TEST(OverviewAxis, PutsBlocksBetweenTheSamplesAroundTheirCentres) {

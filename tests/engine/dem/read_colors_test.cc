@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 #include <ogr_spatialref.h>
@@ -22,6 +23,7 @@ struct ColorSpec {
   bool has_alpha = false;  // the last band
   bool has_palette = false;
   const char* bits = nullptr;  // "12": so many of a sample are used
+  bool states_rgb = false;     // the first three bands are red, green and blue also if there are more than four
   // Raw value of column, row and band, counted from 0.
   std::function<int(int, int, int)> value = [](int, int, int) { return 0; };
 };
@@ -34,6 +36,7 @@ std::string WriteColors(const TempDir& dir, ColorSpec spec, const std::string& n
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
   CPLStringList options;
   if (spec.bits != nullptr) options.SetNameValue("NBITS", spec.bits);
+  if (spec.states_rgb) options.SetNameValue("PHOTOMETRIC", "RGB");
   GDALDatasetUniquePtr dataset(
       driver->Create(path.c_str(), spec.width, spec.height, spec.bands, spec.type, options.List()));
   if (spec.georeferenced) dataset->SetGeoTransform(spec.geo_transform.data());
@@ -224,6 +227,59 @@ TEST(ReadImage, KnowsEveryKindOfBands) {
   // A nodata value in one band is a dark colour; in all bands it is no colour.
   EXPECT_EQ(pixel({.nodata = 0, .value = [](int, int, int band) { return band; }}, 0, 0), (Rgba{0, 1, 2, 255}));
   EXPECT_EQ(pixel({.nodata = 0}, 0, 0)[3], 0);
+}
+
+// GDAL's mask of a band is that of the nodata value where there is one, and ignores the alpha band of more than four.
+TEST(ReadImage, HidesWhatAlphaHidesAndWhatIsNodata) {
+  for (const int bands : {2, 4, 5}) {
+    for (const std::optional<double> nodata : {std::optional<double>(), std::optional(0.0)}) {
+      for (const GDALDataType type : {GDT_Byte, GDT_UInt16}) {
+        SCOPED_TRACE(fmt::format("{} bands of {}, {}", bands, GDALGetDataTypeName(type), nodata ? "nodata" : ""));
+        const TempDir dir;
+        // The left half is transparent, the upper half has the value of nodata, 0. Alpha 1 is not transparent.
+        const int light = type == GDT_Byte ? 200 : 200 * 257;
+        const auto value = [&](int col, int row, int band) {
+          if (band == bands - 1) return col < 8 ? 0 : 1;
+          return row < 8 ? 0 : light;
+        };
+        const auto image = ReadImage(WriteColors(dir, {.bands = bands,
+                                                       .type = type,
+                                                       .nodata = nodata,
+                                                       .has_alpha = true,
+                                                       .states_rgb = bands == 5,
+                                                       .value = value}));
+        ASSERT_TRUE(image) << image.error().message;
+        for (int i = 0; i < 256; ++i) {
+          const Rgba& color = image->colors[static_cast<std::size_t>(i)];
+          const bool is_nodata = nodata && i / 16 < 8;
+          ASSERT_EQ(color[3], i % 16 < 8 || is_nodata ? 0 : 255) << i;
+          const int level = color[3] == 0 || i / 16 < 8 ? 0 : 200;
+          ASSERT_EQ(color[3] == 0 ? 0 : color[0], level) << i;
+        }
+      }
+    }
+  }
+}
+
+// GDAL's mask of a band is then that of the dataset.
+TEST(ReadImage, HidesWhatAlphaHidesAndWhatAMaskHides) {
+  const TempDir dir;
+  const std::string path = WriteColors(dir, {.bands = 4, .has_alpha = true, .value = [](int col, int, int band) {
+                                               return band == 3 ? col % 2 * 255 : 200;
+                                             }});
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    ASSERT_EQ(dataset->CreateMaskBand(GMF_PER_DATASET), CE_None);
+    std::vector<std::uint8_t> shown(128, 255);  // the lower half
+    ASSERT_EQ(dataset->GetRasterBand(1)->GetMaskBand()->RasterIO(GF_Write, 0, 8, 16, 8, shown.data(), 16, 8, GDT_Byte,
+                                                                 0, 0, nullptr),
+              CE_None);
+  }
+  const auto image = ReadImage(path);
+  ASSERT_TRUE(image) << image.error().message;
+  for (int i = 0; i < 256; ++i) {
+    EXPECT_EQ(image->colors[static_cast<std::size_t>(i)][3], i / 16 >= 8 && i % 2 == 1 ? 255 : 0) << i;
+  }
 }
 
 TEST(ReadImage, RefusesWhatIsNoImage) {

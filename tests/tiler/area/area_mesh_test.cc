@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
-#include "tests/engine/dem/dem_fixture.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_data.h"
@@ -297,28 +296,6 @@ TEST_F(AreaMeshTest, ClipsToTheDataset) {
     ASSERT_GT(v.x, -84.43);
     ASSERT_LT(v.y, 36.46);
   }
-}
-
-TEST(AreaMesh, AcrossTheAntimeridianIsNotCut) {
-  const dem::TempDir dir;
-  const auto model = dem::OpenOrFail(dem::WriteRaster(
-      dir, {.width = 200, .height = 100, .geo_transform = {170, .1, 0, 5, 0, -.1}, .value = [](int column, int) {
-              return column;
-            }}));
-  ASSERT_NE(model, nullptr);
-  const auto columns = [&](double west, double east) {
-    const auto plan = PlanArea(*model, 0.5, {west, -1, east, 1, 50}, kMany);
-    return plan ? plan->window.columns * model->LatticeOf(plan->level).StepDegrees() : -1;
-  };
-  EXPECT_NEAR(columns(-180, 180), 20, 0.3);
-  EXPECT_NEAR(columns(175, 185), 10, 0.3);
-  EXPECT_NEAR(columns(-180, 100), 10, 0.3) << "one side";
-  EXPECT_NEAR(columns(-170.01, 171), 1, 0.3) << "parts narrower than a sample do not count";
-  const auto both = PlanArea(*model, 0.5, {-175, -1, 175, 1, 50}, kMany);
-  ASSERT_FALSE(both);
-  EXPECT_NE(both.error().message.find("two parts of the dataset, at longitudes -175 to -170 and 170 to 175"),
-            std::string::npos)
-      << both.error().message;
 }
 
 TEST_F(AreaMeshTest, RefusesAreasBesideTheDataset) {
