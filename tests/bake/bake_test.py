@@ -92,10 +92,12 @@ class Bake(BakeCase):
                 self.expect_equal(place)
                 shutil.rmtree(place)
             process = self.start("--out", place, "--threads", dice.choice((1, 2)), "--json")
-            time.sleep(dice.uniform(0, self.seconds))
+            if kill % 2:
+                process.stdout.readline()  # a unit is finished, also where the machine is slower than it was for self.seconds
+            time.sleep(dice.uniform(0, self.seconds / 2))
             process.kill()
             kept += process.communicate()[0].count('"kept"')
-        self.assertGreater(kept, 0, "no kill left a finished unit: the sleeps do not fit the machine")
+        self.assertGreater(kept, 0, "no kill left a finished unit")
         done = self.run_bake("--out", place)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.expect_equal(place)
