@@ -207,7 +207,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
     document_problem_ = decoded.message;
     if (tree_) return;
     if (asks_again) return statistics_.AddRetry();
-    return GiveUp(fmt::format("{}: {}", options_.document.Text(), decoded.message));
+    return GiveUp(fmt::format("{}: {}", options_.document.PublicText(), decoded.message));
   }
   document_attempts_ = {};
   if (tree_) {
@@ -223,7 +223,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
   }
   Result<std::unique_ptr<TileTree>> tree =
       options_.format == Format::kTerrain ? MakeLayerTree(decoded.text) : MakeTilesetTree(decoded.text);
-  if (!tree) return GiveUp(fmt::format("{}: {}", options_.document.Text(), tree.error().message));
+  if (!tree) return GiveUp(fmt::format("{}: {}", options_.document.PublicText(), tree.error().message));
   tree_ = *std::move(tree);
   version_ = 1;
   record_.document_s = now_s - start_s_;
@@ -416,7 +416,7 @@ void Client::Frame(double now_s, bool is_late) {
   if (!tree_) {
     if (now_s - start_s_ > options_.first_view_limit_s) {
       const std::string& problem = document_problem_;
-      return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.Text(),
+      return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.PublicText(),
                                 options_.first_view_limit_s, problem.empty() ? "" : "; ", problem));
     }
     if (!is_document_requested_ && now_s >= document_due_s_) {

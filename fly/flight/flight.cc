@@ -40,6 +40,7 @@ void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
   HttpOptions http_options = options.http;
   http_options.threads = std::min(cores, 4);
   http_options.clients = options.clients;
+  http_options.headers_origin = options.document.origin;
   // In this order: replies that arrive at the end still find the workers.
   boost::asio::thread_pool workers(static_cast<std::size_t>(cores));
   HttpClient http(http_options);

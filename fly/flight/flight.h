@@ -30,7 +30,7 @@ struct FlightOptions {
   double arrival_limit_s = 10;     // a client waits so long for a full view at the end
   int max_attempts = 6;            // requests for a tile whose failures are transient
   bool keeps_urls = false;         // FlightRecord::urls
-  HttpOptions http;                // `threads` and `clients` are ignored
+  HttpOptions http;                // `threads`, `clients` and `headers_origin` are ignored
 };
 
 // Returns when all clients have arrived or `stop` is set. Calls `each_second` after each second, with its index from 0.

@@ -170,6 +170,7 @@ class HttpClient::Impl {
     request.set(http::field::user_agent, "terrace-fly");
     request.set(http::field::accept, call.accept);
     request.set(http::field::accept_encoding, "gzip");
+    if (call.url.origin != options_.headers_origin) return request;
     for (const auto& header : options_.headers) request.erase(header.first);
     for (const auto& header : options_.headers) request.insert(header.first, header.second);
     return request;
@@ -207,7 +208,7 @@ class HttpClient::Impl {
     reply.retry_after = std::string(message[http::field::retry_after]);
     reply.date = std::string(message[http::field::date]);
     if (const std::string to(message[http::field::location]); !to.empty()) {
-      if (const Result<Url> url = Resolve(call.url, to)) reply.location = url->Text();
+      if (const Result<Url> url = Resolve(call.url, to)) reply.location = url->PublicText();
     }
     reply.cache_control = std::string(message[http::field::cache_control]);
     reply.max_error = std::string(message["Terrain-Max-Error"]);

@@ -16,8 +16,10 @@ struct HttpOptions {
   int threads = 1;
   int clients = 1;        // each has connections of its own
   double timeout_s = 30;  // of connecting to a resolved host, and of a request with its reply
-  // Names and values, in each request. A name replaces a header of the client; repeated names are all sent.
+  // Names and values, in each request to `headers_origin`. A name replaces a header of the client; repeated names are
+  // all sent. Other servers do not get them: a document may name tiles anywhere, and a header may be a secret.
   std::vector<std::pair<std::string, std::string>> headers;
+  Origin headers_origin;
   bool verifies_certificates = true;
 };
 

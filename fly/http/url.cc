@@ -16,6 +16,19 @@ std::string Url::Text() const {
   return std::string(origin.is_tls ? "https://" : "http://") + host + (is_default ? "" : ":" + origin.port) + target;
 }
 
+std::string Url::PublicText() const {
+  constexpr std::size_t kSecretBytes = 16;  // tokens of the server are at least as long
+  const std::size_t query = std::min(target.find('?'), target.size());
+  Url shown{origin, target.substr(0, query)};
+  for (std::size_t at = query; at < target.size();) {
+    const std::size_t end = std::min(target.find('&', at + 1), target.size());
+    const std::size_t value = std::min(target.find('=', at), end - 1) + 1;
+    shown.target += end - value < kSecretBytes ? target.substr(at, end - at) : target.substr(at, value - at) + "...";
+    at = end;
+  }
+  return shown.Text();
+}
+
 Result<Url> ParseUrl(std::string_view text) {
   const auto wrong = [text](std::string_view what) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: {}; give a URL such as http://127.0.0.1:8080/maui", text, what);

@@ -21,6 +21,8 @@ struct Url {
   std::string target;  // "/path?query"; no fragment
 
   std::string Text() const;
+  // For people and reports: without the values of the query that are long enough to be a secret.
+  std::string PublicText() const;
 };
 
 // kInvalidArgument if the text is not an http or https URL; the message begins with it.

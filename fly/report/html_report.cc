@@ -255,11 +255,11 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
   const std::vector<Second>& seconds = record.seconds;
   std::string html =
       R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
-  html += "<title>Flight over " + EscapeHtml(options.document.Text()) + "</title>" + kStyle + "</head><body><main>";
+  html += "<title>Flight over " + EscapeHtml(options.document.PublicText()) + "</title>" + kStyle + "</head><body><main>";
   fmt::format_to(
       std::back_inserter(html),
       R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km path, {:.0f} s each &middot; {} x {} px, {}&deg;, refined above {} px</p>)",
-      EscapeHtml(options.document.Text()), options.clients, options.clients == 1 ? "" : "s",
+      EscapeHtml(options.document.PublicText()), options.clients, options.clients == 1 ? "" : "s",
       options.path.length_m() / 1000, options.duration_s, options.lens.width_px, options.lens.height_px,
       PlainNumber(options.lens.field_of_view), PlainNumber(options.select.max_error_px));
   html += BannerOf(summary, judgements) + CardsOf(summary) + "<h2>The flight</h2>";

@@ -88,7 +88,7 @@ Json SecondJson(const Second& second) {
 std::string JsonOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
                    const std::vector<Second>& seconds) {
   Json json;
-  json["document"] = options.document.Text();
+  json["document"] = options.document.PublicText();
   json["format"] = options.format == Format::kTerrain ? "terrain" : "3dtiles";
   json["summary"] = SummaryJson(summary);
   json["requirements"] = Json::array();

@@ -50,6 +50,28 @@ class Requests(unittest.TestCase):
         self.assertRegex(host[0], r"^127\.0\.0\.1:\d+$")
 
 
+    def test_have_no_headers_for_other_servers(self):
+        seen = {}
+
+        def note(handler, number):
+            seen.setdefault(handler.headers["Host"], set()).add(handler.headers["Authorization"])
+            return False
+
+        def name_tiles_elsewhere(path, status, headers, body):
+            if path.split("?")[0].endswith("layer.json"):
+                document = json.loads(body)
+                document["tiles"] = [f"http://{elsewhere.address}/jacksboro/" + template for template in document["tiles"]]
+                body = json.dumps(document).encode()
+            return status, headers, body
+
+        options = ["--header", "Authorization: Bearer t", "--header", "Accept-Encoding: identity"]
+        with fault_proxy.FaultProxy(flights.UPSTREAM, note) as elsewhere, \
+                fault_proxy.FaultProxy(flights.UPSTREAM, note, name_tiles_elsewhere) as proxy:
+            for first, token in ((proxy, None), (elsewhere, "Bearer t")):
+                self.assertEqual(fly(first.address, *options, way=REST)[0], 0)
+                self.assertEqual(seen.pop(elsewhere.address), {token})
+
+
 class TilesThatFail(unittest.TestCase):
     def test_leave_no_full_view_and_do_not_hold_up_the_flight(self):
         def lose_a_third(path, status, headers, body):

@@ -49,6 +49,16 @@ TEST(Url, HasAColonInTheHostOnlyInBrackets) {
   EXPECT_FALSE(ParseUrl("http://[::1]x:80/"));
 }
 
+TEST(Url, IsShownWithoutSecrets) {
+  const auto shown = [](const char* text) { return ParseUrl(text)->PublicText(); };
+  for (const char* plain : {"http://h/a", "http://h/a?error=5", "http://h/a?token=0123456789abcde&error=5&x", "http://h/?"}) {
+    EXPECT_EQ(shown(plain), plain);
+  }
+  EXPECT_EQ(shown("http://h/a?token=0123456789abcdef"), "http://h/a?token=...");
+  EXPECT_EQ(shown("http://h/a?error=5&token=0123456789abcdef&v=2"), "http://h/a?error=5&token=...&v=2");
+  EXPECT_EQ(shown("http://h/a?token=0123456789abcdef=="), "http://h/a?token=...");
+}
+
 TEST(Url, IsResolvedAgainstADocument) {
   const Url base = *ParseUrl("http://h:8080/a/b/layer.json?error=5");
   EXPECT_EQ(Resolve(base, "1/2/3.terrain?v=1")->target, "/a/b/1/2/3.terrain?v=1");
