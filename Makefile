@@ -71,7 +71,7 @@ install: build  ## install the server and the tiler library (PREFIX=/usr/local, 
 	DESTDIR=$(DESTDIR) cmake --install build/release --prefix $(PREFIX) --component development > /dev/null
 
 docs: deps  ## write config.schema.json and the tables of docs/configuration.md from the options
-	cmake --preset release --log-level=WARNING
+	cmake --preset release -DTERRACE_BUILD_TESTS=OFF --log-level=WARNING
 	cmake --build build/release -j $(JOBS) --target write_option_docs
 	build/release/config/write_option_docs .
 

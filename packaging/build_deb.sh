@@ -20,7 +20,7 @@ export SOURCE_DATE_EPOCH
 maintainer="${DEBFULLNAME:-The terrace authors} <${DEBEMAIL:-terrace@lists.example.org}>"
 
 out=$(realpath -m "${2:-$root/build/deb}")
-rm -rf "$out"
+rm -rf "$out"/terrace "$out"/terrace_* "$out"/build.log
 mkdir -p "$out/terrace/man"
 cp -r "$root/packaging/debian" "$out/terrace/debian"
 cd "$out/terrace"
@@ -38,7 +38,9 @@ sed -e 's,/usr/local/bin/,/usr/bin/,; s/^DynamicUser=yes/User=terrace/; /^# Copy
 sed -e 's/^# Copy both.*/# The package enables both./' -e 's/ Copy both to [^:]*: systemctl enable --now terrace.socket terrace.service//' \
   "$root/config/systemd/terrace.socket" > debian/terrace.socket
 
-# Manual pages, from the help texts of the program itself.
+# Manual pages, from the help texts of the program itself. help2man divides the command at blanks, so the folder of the
+# program is in PATH.
+export PATH=$BUILD/server/cli:$PATH
 manual() {
   local name=$1 what=$2
   shift 2
@@ -47,9 +49,9 @@ manual() {
   # The name of a page has no blank.
   sed -i "s/^terrace ${name#terrace-} \\\\- /$name \\\\- /; s/^[.]TH TERRACE/.TH ${name^^}/" "man/$name.1"
 }
-manual terrace "level-of-detail terrain tile server" "$terrace"
-"$terrace" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\)  *\(.*\)/\1 \2/p' | while read -r command what; do
-  manual "terrace-$command" "${what,}" "$terrace $command"
+manual terrace "level-of-detail terrain tile server" terrace
+terrace --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\)  *\(.*\)/\1 \2/p' | while read -r command what; do
+  manual "terrace-$command" "${what,}" terrace "$command"
 done
 
 dpkg-buildpackage --build=binary --no-sign --unsigned-changes > "$out/build.log" 2>&1 || { tail -n 30 "$out/build.log" >&2; exit 1; }

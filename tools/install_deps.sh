@@ -20,7 +20,7 @@ runtime_packages=(
   libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0 libhiredis0.14
 )
 test_packages=(
-  libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
+  build-essential libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
   clang-14 libclang-rt-14-dev lld llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3 redis-server
   prometheus python3-yaml python3-numpy
   debhelper help2man lintian mkdocs systemd
@@ -66,15 +66,16 @@ install_packages() {
   for package in "${wanted[@]}"; do is_installed "$package" || missing+=("$package"); done
   if [[ ${#missing[@]} -eq 0 ]]; then return; fi
   command -v apt-get > /dev/null || die "apt-get not found; on other systems install the counterparts of: ${missing[*]}"
+  # The tests start their own nginx and Redis, and of Prometheus they take promtool: the services that this installs are
+  # not wanted. Those that run already are the user's.
+  local service services=() unwanted=()
+  $with_tests && [[ -d /run/systemd/system ]] && services=(nginx redis-server prometheus)
+  for service in "${services[@]}"; do systemctl is-active --quiet "$service" || unwanted+=("$service"); done
   refresh_package_lists
   echo "install_deps: apt-get install ${missing[*]}"
   as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
-  # The tests start their own nginx and Redis, and of Prometheus they take promtool; the services are not wanted.
-  local service
-  for service in nginx:nginx-light redis-server:redis-server prometheus:prometheus; do
-    if [[ " ${missing[*]} " == *" ${service#*:} "* && -d /run/systemd/system ]]; then
-      as_root systemctl disable --quiet --now "${service%%:*}" || true
-    fi
+  for service in "${unwanted[@]}"; do
+    if systemctl is-active --quiet "$service"; then as_root systemctl disable --quiet --now "$service" || true; fi
   done
 }
 
@@ -92,9 +93,10 @@ install_boost() {
   package=$(apt-cache search --names-only '^libboost1\.(8[1-9]|9[0-9])-dev$' | awk '{ print $1 }' | sort -V | head -n 1)
   [[ -n $package ]] || die "no libboost1.81-dev or later in the package lists; put Boost >= 1.81 under $prefix/usr yourself"
   echo "install_deps: unpacking the headers of $package into .deps/boost"
-  scratch=$(mktemp -d)
-  (cd "$scratch" && apt-get -qq -o APT::Sandbox::User=root download "$package" && dpkg -x "$package"_*.deb unpacked)
   mkdir -p "$root/.deps"
+  scratch=$(mktemp -d -p "$root/.deps")  # on one file system, so that the move is whole or not at all
+  trap "rm -rf '$scratch'" EXIT
+  (cd "$scratch" && apt-get -qq -o APT::Sandbox::User=root download "$package" && dpkg -x "$package"_*.deb unpacked)
   rm -rf "$prefix"
   chmod 755 "$scratch/unpacked"
   mv "$scratch/unpacked" "$prefix"

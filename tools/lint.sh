@@ -24,8 +24,8 @@ step "layers" tools/check_layers.py
 step "layers, the checker itself" tools/check_layers.py --self-test
 step "leftovers" tools/check_tree.py
 step "leftovers, the checker itself" tools/check_tree.py --self-test
-step "Python" bash -c "git ls-files '*.py' | xargs pyflakes3"
-step "formatting (make format corrects it)" bash -c "git ls-files '*.h' '*.cc' | xargs clang-format-14 --dry-run -Werror"
+step "Python" bash -c "set -o pipefail; git ls-files '*.py' | xargs -r pyflakes3"
+step "formatting (make format corrects it)" bash -c "set -o pipefail; git ls-files '*.h' '*.cc' | xargs -r clang-format-14 --dry-run -Werror"
 step "self-contained headers" headers
 echo "lint: $passed passed$failed"
 [[ -z $failed ]]

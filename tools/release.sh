@@ -22,9 +22,11 @@ while [[ $# -gt 0 ]]; do
     *) echo "release: unknown option '$1'; it takes --commit, --out, --work and --rehearsal" >&2; exit 2 ;;
   esac
 done
-[[ -d $root/.deps/boost && -d $root/server/viewer/node_modules ]] || die ".deps or the viewer's modules are missing; run tools/install_deps.sh"
+[[ -d $root/.deps/boost && -f $root/server/viewer/node_modules/cesium/Build/Cesium/index.js ]] || die ".deps or the viewer's modules are missing; run tools/install_deps.sh"
 [[ -n $(git -C "$root" status --porcelain --untracked-files=no) && $commit == HEAD ]] && echo "release: changes that are not committed are not in the release" >&2
 
+git -C "$root" show "$commit:server/viewer/package-lock.json" | cmp -s - "$root/server/viewer/package-lock.json" ||
+  die "the viewer's modules are not those of $commit: its server/viewer/package-lock.json differs; check the commit out and run tools/install_deps.sh"
 version=$(git -C "$root" show "$commit:CMakeLists.txt" | sed -n 's/^project(terrace VERSION \([0-9.]*\).*/\1/p')
 [[ -n $version ]] || die "CMakeLists.txt of $commit states no version"
 git -C "$root" show "$commit:CHANGELOG.md" | grep -q "^## \[$version\]" || die "CHANGELOG.md of $commit has no section [$version]"
@@ -32,9 +34,8 @@ if [[ -z $work ]]; then
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT
 fi
-mkdir -p "$work"
-rm -rf "$out"
-mkdir -p "$out"
+mkdir -p "$work" "$out"
+rm -f "$out"/terrace[-_]* "$out"/SHA256SUMS*
 
 # The time stamps of git archive are those of the commit.
 git -C "$root" archive --format=tar --prefix="terrace-$version/" "$commit" | gzip -9n > "$out/terrace-$version.tar.gz"
@@ -42,11 +43,12 @@ tree=$work/terrace-$version
 rm -rf "$tree"
 tar -xzf "$out/terrace-$version.tar.gz" -C "$work"
 # What tools/install_deps.sh unpacks, which the commit pins.
-cp -al "$root/.deps" "$tree/.deps" 2> /dev/null || cp -a "$root/.deps" "$tree/.deps"
-cp -al "$root/server/viewer/node_modules" "$tree/server/viewer/node_modules" 2> /dev/null ||
-  cp -a "$root/server/viewer/node_modules" "$tree/server/viewer/node_modules"
+for folder in .deps server/viewer/node_modules; do
+  # Hard links, if both are on one file system; a failure leaves empty folders.
+  cp -al "$root/$folder" "$tree/$folder" 2> /dev/null || { rm -rf "${tree:?}/$folder"; cp -a "$root/$folder" "$tree/$folder"; }
+done
 
-flags=("-ffile-prefix-map=$tree=." -Werror=date-time)
+flags=("'-ffile-prefix-map=$tree=.'" -Werror=date-time)
 $rehearsal && flags=()
 cmake -S "$tree" --preset release -DTERRACE_BUILD_TESTS=OFF "${launcher[@]}" --log-level=WARNING \
   -DCMAKE_CXX_FLAGS="${flags[*]}" > "$work/configure.log"
@@ -62,5 +64,5 @@ cp "$work/deb/$deb" "$out/"
 
 cp "$tree/docker/Dockerfile" "$out/terrace-$version.Dockerfile"
 "$tree/tools/write_sbom.py" "$out/$deb" "$out/terrace-$version.cdx.json" > /dev/null
-(cd "$out" && sha256sum -- * > SHA256SUMS.part && mv SHA256SUMS.part SHA256SUMS)
+(cd "$out" && sha256sum -- terrace[-_]* > SHA256SUMS.part && mv SHA256SUMS.part SHA256SUMS)
 (cd "$out" && cat SHA256SUMS)

@@ -12,7 +12,8 @@ _terrace() {
     return
   fi
   # `--form chunks|folder|single`: the words between the bars; `--config FILE`: files.
-  values=$(sed -n "s/^ *\(-[a-z],\)\?$previous \([a-z0-9-]*|[a-z0-9|-]*\).*/\2/p" <<< "$help" | tr '|' ' ')
+  values=""
+  [[ $previous == -* ]] && values=$(sed -n "s/^ *\(-[a-z],\)\?$previous \([a-z0-9-]*|[a-z0-9|-]*\).*/\2/p" <<< "$help" | tr '|' ' ')
   if [[ -n $values ]]; then COMPREPLY=($(compgen -W "$values" -- "$word")); else COMPREPLY=($(compgen -f -- "$word")); fi
 }
 complete -o filenames -F _terrace terrace

@@ -10,6 +10,7 @@ end
 function __terrace_values
     # `--form chunks|folder|single`: the words between the bars
     set -l words (commandline -opc)
+    string match -q -- "-*" $words[-1]; or return
     terrace $words[2] --help 2>/dev/null | sed -n "s/^ *\(-[a-z],\)\{0,1\}$words[-1] \([a-z0-9-]*|[a-z0-9|-]*\).*/\2/p" | tr '|' '\n'
 end
 complete -c terrace -n __fish_use_subcommand -f -a '(__terrace_commands)'

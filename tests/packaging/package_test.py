@@ -65,6 +65,7 @@ class Package(unittest.TestCase):
         for dataset in configuration["datasets"]:
             for source in dataset["sources"]:
                 self.assertTrue((self.root / source.lstrip("/")).is_file(), source)
+        self.assertTrue((self.root / "usr/share/terrace/viewer/cesium/index.js").is_file(), "run tools/install_deps.sh and build again")
         unit = (self.root / "lib/systemd/system/terrace.service").read_text()
         for program in re.findall(r"^Exec(?:Start|Reload)=(/usr/\S+)", unit, re.MULTILINE):
             self.assertTrue((self.root / program.lstrip("/")).is_file(), program)

@@ -93,11 +93,10 @@ class NativeRestarts(RollingTest):
 
 
 if __name__ == "__main__":
-    path = "/usr/sbin:/sbin:/usr/bin:/bin:/usr/local/bin"
     if not CLIENT:
         print("SKIPPED: native_restart_test needs TERRACE_NATIVE_CLIENT, a host program of cesium-native")
         sys.exit(77)
-    if missing := [tool for tool in (CLIENT, "nginx", "openssl") if not shutil.which(tool, path=path)]:
+    if missing := [tool for tool in (CLIENT, "nginx", "openssl") if not shutil.which(tool)]:
         print(f"SKIPPED: native_restart_test needs {', '.join(missing)}")
         sys.exit(77)
     unittest.main()
