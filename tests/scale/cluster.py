@@ -38,7 +38,7 @@ def free_port():
             return port
 
 
-def wait_for_port(port, seconds=20):
+def wait_for_port(port, seconds=60):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         with socket.socket() as s:
