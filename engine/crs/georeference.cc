@@ -85,7 +85,7 @@ std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
     // IsSame distinguishes an ensemble from its datum, but their projections are equal.
     if (registered.importFromEPSG(std::atoi(code)) == OGRERR_NONE &&
         (registered.IsSame(&horizontal) != 0 || (Proj4(registered) && Proj4(registered) == Proj4(horizontal)))) {
-      if (std::string wkt = EpsgWkt(code); !wkt.empty()) return wkt;
+      if (Result<std::string> wkt = EpsgWkt(code)) return *std::move(wkt);
     }
   }
   return Wkt(horizontal);

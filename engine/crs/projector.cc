@@ -86,19 +86,21 @@ void Projector::Transform(std::span<Position> positions, bool forward) const {
 void Projector::Forward(std::span<Position> positions) const { Transform(positions, true); }
 void Projector::Inverse(std::span<Position> positions) const { Transform(positions, false); }
 
-std::string EpsgWkt(const std::string& code) {
+Result<std::string> EpsgWkt(const std::string& code) {
   static std::mutex mutex;
   static std::map<std::string, std::string> known;
   const std::lock_guard lock(mutex);
-  const auto [entry, is_new] = known.try_emplace(code);
-  if (!is_new) return entry->second;
+  if (const auto found = known.find(code); found != known.end()) return found->second;
   const ProjContextPtr context = MakeProjContext();
   const ProjObjectPtr crs(proj_create_from_database(context.get(), "EPSG", code.c_str(), PJ_CATEGORY_CRS,
                                                     /*usePROJAlternativeGridNames=*/0, nullptr));
   const char* const options[] = {"MULTILINE=NO", nullptr};
   const char* text = crs == nullptr ? nullptr : proj_as_wkt(context.get(), crs.get(), PJ_WKT2_2019, options);
-  if (text != nullptr) entry->second = text;
-  return entry->second;
+  if (text != nullptr) return known.emplace(code, text).first->second;
+  if (proj_context_get_database_metadata(context.get(), "EPSG.VERSION") == nullptr) {
+    return MakeError(ErrorCode::kUnavailable, "PROJ cannot read its database");
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "PROJ knows no EPSG:{}", code);
 }
 
 }  // namespace terrace::dem

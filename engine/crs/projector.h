@@ -42,8 +42,8 @@ class Projector {
   OperationPool operations_;
 };
 
-// Returns the reference system of an EPSG code as WKT 2:2019, from PROJ's database; empty if there is none. Every
-// thread gets the same text.
-std::string EpsgWkt(const std::string& code);
+// Returns the reference system of an EPSG code as WKT 2:2019, from PROJ's database. Every thread gets the same text.
+// kInvalidArgument: there is none. kUnavailable: the database cannot be read now.
+Result<std::string> EpsgWkt(const std::string& code);
 
 }  // namespace terrace::dem

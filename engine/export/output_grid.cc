@@ -33,8 +33,9 @@ bool RunsEastAndNorth(const OGRSpatialReference& srs) {
 
 Result<void> SetCrs(int epsg, OutputGrid& grid) {
   grid.epsg = epsg;
-  grid.wkt = EpsgWkt(std::to_string(epsg));
-  if (grid.wkt.empty()) return Invalid(fmt::format("crs: PROJ knows no EPSG:{}", epsg));
+  Result<std::string> wkt = EpsgWkt(std::to_string(epsg));
+  if (!wkt) return tl::unexpected(Error{wkt.error().code, "crs: " + wkt.error().message});
+  grid.wkt = *std::move(wkt);
   OGRSpatialReference srs;
   const bool is_read = srs.importFromWkt(grid.wkt.c_str()) == OGRERR_NONE;
   if (!is_read || srs.IsCompound() || !(srs.IsProjected() || srs.IsGeographic()) || srs.GetAxesCount() != 2) {

@@ -185,11 +185,12 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
-  const bool is_polar =
-      dataset.bounds.south >= geo::kMercatorLatitude || dataset.bounds.north <= -geo::kMercatorLatitude;
+  const bool is_image = format == tiler::TileFormat::kImagery && dataset.imagery;
+  const dem::GeoBounds& bounds = is_image ? dataset.imagery->bounds : dataset.bounds;
+  const bool is_polar = bounds.south >= geo::kMercatorLatitude || bounds.north <= -geo::kMercatorLatitude;
   if (tiler::IsMercator(format) && is_polar) {
-    return MakeError(ErrorCode::kNotFound,
-                     "the dataset lies beyond 85.05 degrees of latitude, where Web Mercator ends");
+    return MakeError(ErrorCode::kNotFound, "the {} lies beyond 85.05 degrees of latitude, where Web Mercator ends",
+                     is_image ? "image" : "dataset");
   }
   if (!dataset.only_archive) return {};
   const std::vector<tiler::TileFormat>& formats = dataset.only_archive->extent().formats;

@@ -17,6 +17,10 @@ tiler::Coding CodingFor(const Request& request) {
   return NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly);
 }
 
+std::string EtagOf(const DocumentPlan& plan, tiler::Coding coding) {
+  return tiler::RequestETag("document", plan.key, *plan.generation, "", coding);
+}
+
 }  // namespace
 
 Document Document::Make(std::string bytes, std::string_view content_type, std::optional<std::string> gzipped) {
@@ -66,7 +70,7 @@ Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Req
   response.content_type = plan.content_type;
   response.content_encoding = tiler::NameOf(made.coding);
   response.body = made.body;
-  response.etag = made.etag;
+  response.etag = plan.generation ? EtagOf(plan, CodingFor(request)) : made.etag;
   response.cache_control = made.is_final ? plan.cache_control : kRevalidate;
   response.vary = "Accept-Encoding";
   response.depends_on_token = plan.depends_on_token;
@@ -81,6 +85,9 @@ Answer DocumentMaker::Make(DocumentAnswer described, const RequestContext& conte
   if (plan == nullptr) return std::get<Response>(std::move(described));
   const tiler::Coding coding = CodingFor(*context.request);
   if (const auto kept = kept_.Find(Key{plan->key, coding})) return Serve(*kept, *plan, *context.request);
+  if (plan->generation && NamesEtag(context.request->fields->if_none_match, EtagOf(*plan, coding))) {
+    return Serve(RenderedDocument{std::make_shared<const std::string>(), coding, {}}, *plan, *context.request);
+  }
   return MakeOnWorker(std::move(*plan), coding, context);
 }
 

@@ -60,6 +60,9 @@ struct DocumentPlan {
   std::string_view cache_control;  // outlives the request
   bool depends_on_token = false;   // as in Response
   Write write;
+  // Of the dataset, if the document depends on nothing else: clients that have it are answered before it is written.
+  // Nothing: the ETag is a hash of the bytes.
+  std::optional<std::uint64_t> generation;
 };
 
 // The result of a handler of documents: a reply, or a plan to make one.

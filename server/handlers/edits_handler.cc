@@ -60,12 +60,14 @@ DocumentAnswer DescribeEdits(const HandlerState& state, const RequestContext& co
     return ClientErrorResponse(none.error(), context.request->id);
   }
   const tiler::Dataset& dataset = state.catalog->pipeline->datasets()[*index];
-  if (!state.catalog->datasets[*index].edits_hash) {
+  const DatasetView& view = state.catalog->datasets[*index];
+  if (!view.edits_hash) {
     return ProblemResponse(404, "this dataset has no edits; /datasets lists the URLs of each dataset",
                            context.request->id);
   }
   DocumentPlan plan;
-  plan.key = "edits " + std::to_string(*index);
+  plan.key = "edits " + view.name;
+  plan.generation = view.generation;
   plan.content_type = "application/geo+json";
   plan.cache_control = kRevalidate;
   plan.write = [&dataset](const std::stop_token& stop) {

@@ -20,12 +20,21 @@
 namespace terrace::server {
 namespace {
 
-// From this number of rays on, looking along them is long work, which never occupies all workers.
+// Above this number of rays, or above this length of all of them, looking along them is long work, which never occupies
+// all workers.
 constexpr std::size_t kFewRays = 16;
+constexpr double kShortRays_m = 100'000;
 // A query of at most this many bytes has a few rays and is parsed in microseconds.
 constexpr std::size_t kQuickQuery = 512;
 // Rays written between two checks of the stop token.
 constexpr std::size_t kRayStopPeriod = 1024;
+
+bool IsLong(const SightQuery& query) {
+  if (query.drawn || query.rays.size() > kFewRays) return true;
+  double length_m = 0;
+  for (const dem::SightRay& ray : query.rays) length_m += dem::LengthOf(ray);
+  return length_m > kShortRays_m;
+}
 
 // Replaces heights above the surface by heights above the ellipsoid.
 Result<void> RaiseFromGround(const tiler::TilePipeline& pipeline, std::uint32_t dataset, SightQuery& query,
@@ -128,7 +137,7 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
     response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
     if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
-  const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
+  const bool is_long = IsLong(*parsed);
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
   Work<MadeReply> work = [catalog = state.catalog, dataset, coding, query,
                           requested_at = JobClock::now()](const std::stop_token& stop) -> Result<MadeReply> {

@@ -65,7 +65,9 @@ void AddTileset(const DatasetView& dataset, HandlerState::DatasetDocuments& made
   bool are_ranges_known = true;  // not used: roots have no ranges
   made.roots =
       std::make_shared<const std::vector<proto::TreeRoot>>(tiler::TreesOf(TreeOf(dataset, {}, are_ranges_known)));
-  made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", "").bytes, "application/json");
+  DocumentText tileset = WriteTileset(dataset, *made.roots, {}, "", "");
+  // Else each request writes it, until every range can be read.
+  if (tileset.is_final) made.tileset = Document::Make(std::move(tileset.bytes), "application/json");
 }
 
 DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& context) {
@@ -82,7 +84,8 @@ DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& 
       CheckHasQueriedTiles(state.catalog->datasets[*dataset], tiler::TileFormat::kGlb, content_parameters);
   if (!has_kind) return ClientErrorResponse(has_kind.error(), context.request->id);
   std::string content_query = WithToken(content_parameters, context);
-  if (content_query.empty()) return Serve(state.dataset_documents[*dataset].tileset, *context.request, kRevalidate);
+  const Document& kept = state.dataset_documents[*dataset].tileset;
+  if (content_query.empty() && kept.identity) return Serve(kept, *context.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), context);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(context)));

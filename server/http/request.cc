@@ -190,11 +190,10 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
   const std::size_t from = std::max<std::size_t>(scanned, 3) - 3;  // the end may be split between two reads
   const std::size_t end = bytes.find("\r\n\r\n", from);
   const std::string_view head = bytes.substr(0, end);  // all of it if there is no end
-  // The first line may have 18 bytes more than the target: "OPTIONS ", " HTTP/1.1", and a CR whose LF has not arrived.
-  const std::size_t first_line = head.find("\r\n");
-  if (std::min(first_line, head.size()) > kMaxTargetBytes + 18) return Bad(414, kLongTarget);
   if (end == std::string_view::npos ? bytes.size() >= kMaxHeadBytes : end + 4 > kMaxHeadBytes) {
-    return Bad(431, kLongHead);
+    // The first line may have 17 bytes more than the target: "OPTIONS " and " HTTP/1.1".
+    const bool is_long_target = std::min(head.find("\r\n"), head.size()) > kMaxTargetBytes + 17;
+    return is_long_target ? Bad(414, kLongTarget) : Bad(431, kLongHead);
   }
   for (std::size_t at = head.find('\n', from); at != std::string_view::npos; at = head.find('\n', at + 1)) {
     if (at == 0 || head[at - 1] != '\r') return Bad(400, "a line ends without CR");
@@ -216,9 +215,29 @@ std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& 
   return line->size + memo.bytes.size();
 }
 
+namespace {
+
+// The value of the only Origin line of a message that was not parsed; empty if there is none or more than one.
+std::string OriginOf(std::string_view bytes) {
+  constexpr std::string_view kName = "origin:", kLineEnd = "\r\n";
+  std::string origin;
+  for (std::size_t at = bytes.find(kLineEnd); at != std::string_view::npos; at = bytes.find(kLineEnd, at + 1)) {
+    const std::string_view line = bytes.substr(at + kLineEnd.size());
+    const std::size_t end = line.find(kLineEnd);
+    if (end == 0 || end == std::string_view::npos) break;  // of the head, or of what has arrived
+    if (!EqualsIgnoringCase(line.substr(0, kName.size()), kName)) continue;
+    if (!origin.empty()) return {};
+    origin = Trim(line.substr(kName.size(), end - kName.size()));
+  }
+  return origin;
+}
+
+}  // namespace
+
 Request FirstLineOf(std::string_view bytes) {
   Request request;
   request.method = Method::kOther;
+  request.fields.Set(&RequestFields::origin, OriginOf(bytes));
   std::string_view line = bytes.substr(0, bytes.find_first_of("\r\n"));
   const std::size_t blank = line.find(' ');
   const std::string_view method = line.substr(0, blank);

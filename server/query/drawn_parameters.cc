@@ -31,7 +31,9 @@ Result<void> SetRequested(const DrawnTexts& texts, tiler::RequestedError& reques
   if (!texts.at_least) return {};
   const Result<void> set = SetOneOf(requested.at_least, "atleast", *texts.at_least, {{"0", false}, {"1", true}});
   if (!set) return set;
-  if (!requested.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  if (requested.at_least && !requested.error_m) {
+    return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  }
   return {};
 }
 

@@ -208,6 +208,19 @@ TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
   EXPECT_EQ(StatusOf(polite), 200);
 }
 
+TEST_F(Fairness, LongRaysLeaveAWorkerForTiles) {
+  StartHeld();
+  const std::string ray = "/maui/sight?heights=ground&rays=1,7,2,3,7,2";  // 200 km
+  for (int i = 0; i < 4; ++i) Send(Get(ray, From("192.0.2.1")));
+  ASSERT_TRUE(Waiting(3));
+  ASSERT_TRUE(HaveBegun(1));
+  RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
+  ASSERT_TRUE(HaveBegun(2));
+  EXPECT_EQ(Begun()[1], "0/0/0");
+  LetAllGo();
+  EXPECT_EQ(StatusOf(polite), 200);
+}
+
 class Uploads : public Fairness {
  protected:
   // A body of the largest accepted size, mostly blanks.

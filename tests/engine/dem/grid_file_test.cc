@@ -3,18 +3,36 @@
 #include <cpl_vsi.h>
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <ogr_spatialref.h>
 
 #include <set>
 #include <string>
 #include <vector>
 
+#include "engine/crs/projector.h"
 #include "engine/export/output_grid.h"
 
 namespace terrace::dem {
 namespace {
 
 // GDAL writes such a system beside the file, where a reply has no place for it.
+// No other test of this program may use these codes: EpsgWkt keeps what it has found.
+TEST(OutputGrid, AFailureOfTheDatabaseIsNoUnknownCodeAndPasses) {
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const rlimit none{0, limit.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const Result<std::string> without = EpsgWkt("25831");
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
+  ASSERT_FALSE(without);
+  EXPECT_EQ(without.error().code, ErrorCode::kUnavailable) << without.error().message;
+  EXPECT_TRUE(EpsgWkt("25831"));
+  const Result<std::string> unknown = EpsgWkt("999999");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
   const GridRequest equal_earth{
       .epsg = 8857, .west = 1e6, .south = 5e6, .east = 1.2e6, .north = 5.2e6, .columns = 2, .rows = 2};

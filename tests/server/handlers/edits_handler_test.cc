@@ -4,6 +4,7 @@
 #include <stop_token>
 
 #include "server/handlers/handlers.h"
+#include "tests/server/handlers/at_once.h"
 
 namespace terrace::server {
 namespace {
@@ -41,6 +42,30 @@ TEST(EditsHandler, Stops) {
   std::stop_source stop;
   stop.request_stop();
   EXPECT_EQ(EditsGeoJson({Outline("hole", "a", true)}, stop.get_token()), "");
+}
+
+// A file of outlines may be larger than the cache of documents.
+TEST(EditsHandler, IsNotWrittenForClientsThatHaveIt) {
+  const TestHandlerState state(std::vector<DatasetView>{});
+  DocumentPlan plan;
+  plan.key = "edits maui";
+  plan.generation = 7;
+  plan.content_type = "application/geo+json";
+  plan.cache_control = "no-cache";
+  plan.write = [](const std::stop_token&) -> DocumentText {
+    ADD_FAILURE();
+    return {};
+  };
+  const RenderedDocument written{std::make_shared<const std::string>("{}"), tiler::Coding::kIdentity, {}};
+  Request request;
+  const std::string etag = Serve(written, plan, request).etag;
+  request.fields.Set(&RequestFields::if_none_match, etag);
+  Answer answer = state.all.documents.Make(plan, TestContext("/maui/edits.geojson", request).context);
+  ASSERT_TRUE(std::holds_alternative<Response>(answer));
+  EXPECT_EQ(std::get<Response>(answer).status, 304);
+  EXPECT_EQ(std::get<Response>(answer).etag, etag);
+  plan.generation = 8;
+  EXPECT_EQ(Serve(written, plan, request).status, 200);
 }
 
 }  // namespace

@@ -95,6 +95,16 @@ TEST_F(TileJsonHandlerTest, DescribesLayersForMaps) {
   EXPECT_EQ(GetMap("/nope/slope/tiles.json").status, 404);
 }
 
+TEST_F(TileJsonHandlerTest, HasNoMapsOfImagesBeyondWebMercator) {
+  datasets_[0].imagery = {{-180, 86, 180, 90}, 9, 8};
+  const Response reply = GetMap("/a%20b/imagery/tiles.json");
+  EXPECT_EQ(reply.status, 404);
+  EXPECT_NE(reply.body->find("the image lies beyond 85.05"), std::string::npos) << *reply.body;
+  EXPECT_EQ(GetMap("/a%20b/slope/tiles.json").status, 200) << "of the heights";
+  datasets_[0].imagery->bounds.south = 80;
+  EXPECT_EQ(GetMap("/a%20b/imagery/tiles.json").status, 200);
+}
+
 TEST_F(TileJsonHandlerTest, RefusesWhatItCannotServe) {
   EXPECT_EQ(Get("/nope/tiles.json").status, 404);
   EXPECT_EQ(Get("/a%20b/tiles.json?size=1").status, 400);

@@ -207,6 +207,20 @@ TEST_F(TilesetHandlerTest, SubtreesWithoutTheRangeOfATileHaveThatOfTheDatasetAnd
   EXPECT_LE(height_of(tight), 10);
 }
 
+TEST_F(TilesetHandlerTest, TilesetsWithoutTheRangeOfATileAreWrittenAgain) {
+  datasets_[0].heights = {-50, 70};
+  bool is_readable = false;
+  datasets_[0].range_bound = [&](const geo::TileKey&) -> Result<dem::HeightRange> {
+    if (!is_readable) return MakeError(ErrorCode::kUnavailable, "cannot be read now");
+    return dem::HeightRange{0, 1};
+  };
+  state_.emplace(datasets_);
+  const auto highest = [&] { return Tileset().at("root").at("children")[0].at("boundingVolume").at("region")[5].get<double>(); };
+  EXPECT_GE(highest(), 70);
+  is_readable = true;
+  EXPECT_LT(highest(), 70);
+}
+
 TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
   for (const char* const root : {"7-16-32", "7-17-32"}) {
     const Response response = Get(std::string("/maui/3dtiles/") + root + "/0/0/0.6.subtree");

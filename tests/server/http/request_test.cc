@@ -195,8 +195,8 @@ TEST(HeadEnd, BoundsTheTargetAndTheHead) {
   const std::string fits(kMaxTargetBytes - 1, 'a');
   EXPECT_TRUE(ParseHead("GET /" + fits + " HTTP/1.1\r\nHost: x\r\n\r\n"));
   EXPECT_EQ(ParseHead("GET /" + fits + "a HTTP/1.1\r\nHost: x\r\n\r\n").error().status, 414);
-  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxTargetBytes + 100, 'a'), 0).error().status, 414)
-      << "before the line is complete";
+  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxTargetBytes + 100, 'a'), 0), 0u) << "its Origin may follow";
+  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxHeadBytes, 'a'), 0).error().status, 414);
   EXPECT_EQ(FindHeadEnd(Get("A: " + std::string(kMaxHeadBytes, 'b')), 0).error().status, 431);
   EXPECT_EQ(FindHeadEnd(Get("").substr(0, 20) + std::string(kMaxHeadBytes, 'b'), 0).error().status, 431);
 }
@@ -213,6 +213,12 @@ TEST(FirstLine, IsToldOfWhatIsRefused) {
   EXPECT_EQ(head.method_name, "HEAD");
   EXPECT_EQ(head.target, "/maui/layer.json?token=secret-1&x=1");
   EXPECT_TRUE(head.is_private);
+  EXPECT_EQ(head.fields->origin, "");
+  EXPECT_EQ(FirstLineOf("GET / HTTP/1.1\r\nHost: a\r\nORIGIN: https://a \r\nHost: b\r\n\r\n").fields->origin, "https://a");
+  for (const char* several : {"GET / HTTP/1.1\r\nOrigin: a\r\nOrigin: b\r\n\r\n", "GET / HTTP/1.1\r\n\r\nOrigin: a\r\n",
+                              "GET / HTTP/1.1\r\nOrigin: a"}) {
+    EXPECT_EQ(FirstLineOf(several).fields->origin, "") << several;
+  }
   const Request cut = FirstLineOf("GET /" + std::string(100, 'a'));
   EXPECT_EQ(cut.method, Method::kGet);
   EXPECT_EQ(cut.target, "/" + std::string(100, 'a'));

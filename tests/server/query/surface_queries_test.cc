@@ -86,6 +86,7 @@ TEST(DrawnSurface, ReadsTheParametersOfTiles) {
   EXPECT_EQ(query->drawn->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(query->drawn->compression, proto::GlbCompression::kMeshopt);
   EXPECT_FALSE(ParseHeights({"locations=1,2&surface=source", {}, {}}, 9)->drawn);
+  EXPECT_TRUE(ParseHeights({"locations=1,2&surface=served&atleast=0", {}, {}}, 9)) << "as on URLs of tiles";
 }
 
 TEST(DrawnSurface, SaysWhatIsWrong) {
