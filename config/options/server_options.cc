@@ -173,7 +173,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
            "systemd sets `$CACHE_DIRECTORY`. The log names the folder. An empty text is `none`. For a folder with one "
            "of these two names, write `./default` or `./none`. The folder holds the ranges of sources, the errors of "
            "their averages, and the averages for shallow tiles if the source has no such overviews: about 1.4 bytes "
-           "per sample, 18 MB for a raster of 3601 x 3601. The log reports progress; an interrupted pass continues at "
+           "per sample, 18 MB for a raster of 3601 x 3601. Progress goes to stderr; an interrupted pass continues at "
            "the next start. Sources are identified by path, size and times, so a replaced source is read again. "
            "Several servers may share the folder. Without the folder, or if it fails, averages are "
            "[kept in memory](operations.md#cache_dir) as far as they fit. Relative to the folder of the file",

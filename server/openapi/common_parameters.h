@@ -34,7 +34,9 @@ inline constexpr ParameterNote kEncodingNote{
 inline constexpr ParameterNote kSizeNote{"size", "Pixels along an edge; 256 is the default.",
                                          R"({"type":"integer","enum":[256,512]})"};
 inline constexpr ParameterNote kSurfaceNote{
-    "surface", "`source`, the default: the sources. `served`: the mesh that clients decode.",
+    "surface",
+    "`source`: the sources; the default, except of `/grid` and `/sight` of an archive alone. `served`: the mesh that "
+    "clients decode.",
     R"({"type":"string","enum":["source","served"]})"};
 inline constexpr ParameterNote kSurfaceLevelNote{
     "level",

@@ -22,9 +22,9 @@ const Operation kReadyOperation{
     .summary = "Readiness",
     .description =
         "`ready`, or `degraded` if a changed source or configuration cannot be loaded, if a dataset is still being "
-        "reopened after 10 s, if files of a dataset that is an archive alone are missing, or while a dataset is being "
-        "prepared and others are served. 503: `opening` while the "
-        "server starts or prepares all that it has, `draining` while it stops.",
+        "reopened after 10 s, if a source is not stored in `cache_dir`, if files of a dataset that is an archive alone "
+        "are missing, or while a dataset is being prepared and others are served. 503: `opening` while the server "
+        "starts or prepares all that it has, `draining` while it stops.",
     .replies = kPlainText,
     .unavailable = kPlainText,
     .headers = kStateHeaders,
