@@ -96,11 +96,16 @@ Result<void> CheckHasHeights(const GridQuery& query, const dem::OutputGrid& grid
                    grid.epsg, grid.unit, DataBox(grid, view));
 }
 
+// As `bbox` takes it: west > east across the antimeridian.
+double RequestedEast(const dem::OutputGrid& grid) {
+  return grid.is_geographic && grid.east > 180 ? grid.east - 360 : grid.east;
+}
+
 // The Terrain-Grid header.
 std::string Describe(const dem::OutputGrid& grid, const Steps& steps) {
   return fmt::format(
       "width={}, height={}, crs=\"EPSG:{}\", west={}, south={}, east={}, north={}, offset={}, scale={}, voids={}",
-      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, grid.east, grid.north, steps.offset, steps.scale,
+      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, RequestedEast(grid), grid.north, steps.offset, steps.scale,
       steps.voids);
 }
 
@@ -110,8 +115,8 @@ std::string GridJson(const dem::OutputGrid& grid, const Steps& steps) {
   return fmt::format(
       "{{\"width\":{},\"height\":{},\"crs\":\"EPSG:{}\",\"bbox\":[{},{},{},{}],\"spacing\":[{},{}],\"offset\":{},"
       "\"scale\":{},\"voids\":{},\"unreal\":{{\"scale_z\":{},\"zero_m\":{}}}}}",
-      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, grid.east, grid.north, grid.step_x(), grid.step_y(),
-      steps.offset, steps.scale, steps.voids, steps.scale * kUnrealSteps, steps.offset + 32768 * steps.scale);
+      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, RequestedEast(grid), grid.north, grid.step_x(),
+      grid.step_y(), steps.offset, steps.scale, steps.voids, steps.scale * kUnrealSteps, steps.offset + 32768 * steps.scale);
 }
 
 Result<std::string> Encode(const GridQuery& query, const dem::OutputGrid& grid, const std::vector<float>& heights,

@@ -212,6 +212,11 @@ class GridsAndSight(unittest.TestCase):
             self.assertIn("no node of the grid has a height", refused)
             self.assertRegex(refused, r"in units of the crs, EPSG:4326: degree; the data is in 6\.999\d*,45\.999\d*,8\.000\d*,47\.000\d*: ")
         self.assertEqual(json.loads(self.get(beside + "&format=json&range=0,512")[0])["voids"], 6)
+        # Replies name a box as a request does.
+        across = "/grid?bbox=170,-20,-170,-10&width=5&height=3&range=0,512&format="
+        body = self.get(across + "json")[0]
+        self.assertEqual((json.loads(body)["bbox"], json.loads(body)["spacing"]), ([170, -20, -170, -10], [5, 5]))
+        self.assertIn("east=-170,", self.get(across + "r16")[1]["Terrain-Grid"])
         # Degrees in a reference system of metres: the box of the message is one that can be asked for.
         degrees = "/grid?crs=EPSG:32632&width=3&height=3&format=r16&bbox="
         refused = self.refused(degrees + "7.2,46.2,7.4,46.3")
