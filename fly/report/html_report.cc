@@ -255,7 +255,8 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
   const std::vector<Second>& seconds = record.seconds;
   std::string html =
       R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
-  html += "<title>Flight over " + EscapeHtml(options.document.PublicText()) + "</title>" + kStyle + "</head><body><main>";
+  html +=
+      "<title>Flight over " + EscapeHtml(options.document.PublicText()) + "</title>" + kStyle + "</head><body><main>";
   fmt::format_to(
       std::back_inserter(html),
       R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km path, {:.0f} s each &middot; {} x {} px, {}&deg;, refined above {} px</p>)",

@@ -17,6 +17,13 @@ std::string BytesUpTo(std::size_t bound) { return std::string(bound, '\0'); }
 
 unsigned char* Bytes(std::string& text) { return reinterpret_cast<unsigned char*>(text.data()); }
 
+// The extension requires version 0 of the codec of vertices and 1 of that of indices. They are globals of the library,
+// set once before its use; the defaults differ between its releases.
+void SetVersions() {
+  static const bool are_set = (meshopt_encodeVertexVersion(0), meshopt_encodeIndexVersion(1), true);
+  static_cast<void>(are_set);
+}
+
 }  // namespace
 
 VertexOrder OrderForMeshopt(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
@@ -30,6 +37,7 @@ VertexOrder OrderForMeshopt(const std::vector<Triangle>& triangles, std::size_t 
 
 std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, std::size_t stride) {
   TERRACE_CHECK(records.size() == count * stride && stride % 4 == 0 && stride > 0 && stride <= 256);
+  SetVersions();
   std::string bytes = BytesUpTo(meshopt_encodeVertexBufferBound(count, stride));
   bytes.resize(meshopt_encodeVertexBuffer(Bytes(bytes), bytes.size(), records.data(), count, stride));
   TERRACE_CHECK(!bytes.empty());
@@ -38,10 +46,7 @@ std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, s
 
 std::string EncodeMeshoptTriangles(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   TERRACE_CHECK(!triangles.empty());
-  // The extension requires version 1 of the index codec. The version is a global of the library, set once before its
-  // use.
-  static const bool version_set = (meshopt_encodeIndexVersion(1), true);
-  static_cast<void>(version_set);
+  SetVersions();
   const std::size_t count = 3 * triangles.size();
   std::string bytes = BytesUpTo(meshopt_encodeIndexBufferBound(count, vertex_count));
   bytes.resize(meshopt_encodeIndexBuffer(Bytes(bytes), bytes.size(), Indices(triangles), count));

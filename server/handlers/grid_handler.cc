@@ -105,8 +105,8 @@ double RequestedEast(const dem::OutputGrid& grid) {
 std::string Describe(const dem::OutputGrid& grid, const Steps& steps) {
   return fmt::format(
       "width={}, height={}, crs=\"EPSG:{}\", west={}, south={}, east={}, north={}, offset={}, scale={}, voids={}",
-      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, RequestedEast(grid), grid.north, steps.offset, steps.scale,
-      steps.voids);
+      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, RequestedEast(grid), grid.north, steps.offset,
+      steps.scale, steps.voids);
 }
 
 // Unreal Engine's landscapes: an integer is 1/128 cm at a scale of 1, and 32768 is height 0.
@@ -116,7 +116,8 @@ std::string GridJson(const dem::OutputGrid& grid, const Steps& steps) {
       "{{\"width\":{},\"height\":{},\"crs\":\"EPSG:{}\",\"bbox\":[{},{},{},{}],\"spacing\":[{},{}],\"offset\":{},"
       "\"scale\":{},\"voids\":{},\"unreal\":{{\"scale_z\":{},\"zero_m\":{}}}}}",
       grid.columns, grid.rows, grid.epsg, grid.west, grid.south, RequestedEast(grid), grid.north, grid.step_x(),
-      grid.step_y(), steps.offset, steps.scale, steps.voids, steps.scale * kUnrealSteps, steps.offset + 32768 * steps.scale);
+      grid.step_y(), steps.offset, steps.scale, steps.voids, steps.scale * kUnrealSteps,
+      steps.offset + 32768 * steps.scale);
 }
 
 Result<std::string> Encode(const GridQuery& query, const dem::OutputGrid& grid, const std::vector<float>& heights,

@@ -423,9 +423,10 @@ TEST_F(Limits, LetsTheConfiguredPagesReadReplies) {
     EXPECT_FALSE(reply.fields.contains("access-control-allow-origin")) << origin;
     EXPECT_EQ(reply.Field("vary"), "Origin") << "another page would be answered otherwise";
   }
-  const std::string target = "/maui/heights?locations=" + std::string(9000, '1'), page = "Origin: https://maps.example\r\n";
-  for (const auto& [refused, status] : {std::pair(Fetch(port(), target, page), 414),
-                                        std::pair(Fetch(port(), "/livez", page + "Host: a\r\n"), 400)}) {
+  const std::string target = "/maui/heights?locations=" + std::string(9000, '1'),
+                    page = "Origin: https://maps.example\r\n";
+  for (const auto& [refused, status] :
+       {std::pair(Fetch(port(), target, page), 414), std::pair(Fetch(port(), "/livez", page + "Host: a\r\n"), 400)}) {
     EXPECT_EQ(refused.status, status);
     EXPECT_EQ(refused.Field("access-control-allow-origin"), "https://maps.example") << status;
   }

@@ -471,5 +471,39 @@ TEST_F(Edits, CutHoles) {
   }
 }
 
+// Ground may stand in a hole as far as a triangle of one cell at its outline, whatever the criterion.
+TEST_F(Edits, CutHolesAlongTheirOutline) {
+  constexpr double kReach = 0.06;  // of a diamond: all steps of its outline are diagonal
+  const std::string diamond =
+      Feature(R"({"op":"hole"})",
+              fmt::format(R"({{"type":"Polygon","coordinates":[[{0},{1},{2},{3},{0}]]}})", Position(kReach, 0),
+                          Position(0, kReach), Position(-kReach, 0), Position(0, -kReach)));
+  for (const MeshOptions& mesh : {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
+                                  MeshOptions{tin::Criterion::kDataDependent, true}}) {
+    const TilePipeline pipeline = Open({diamond}, mesh);
+    const double side = 180.0 / static_cast<double>(geo::TileRows(11));
+    const double cell = side / ModelOf(pipeline).LatticeOf(11).cells;
+    int cut = 0;
+    for (int dy = -1; dy <= 0; ++dy) {
+      for (int dx = -1; dx <= 0; ++dx) {
+        const geo::TileKey key = TileAt(11, dx, dy);
+        const FetchedTile tile = FetchTile(pipeline, RequestFor(key, geo::SnapToLadder(11, 2)));
+        double deepest = 0;  // cells
+        for (const auto& triangle : tile.mesh.triangles) {
+          if (triangle[0] == triangle[1]) continue;
+          for (const std::uint32_t k : triangle) {
+            const double east = (static_cast<double>(key.x) + tile.mesh.u[k] / 32767.0) * side - 180 - kLongitude;
+            const double north = (static_cast<double>(key.y) + tile.mesh.v[k] / 32767.0) * side - 90 - kLatitude;
+            deepest = std::max(deepest, (kReach - std::abs(east) - std::abs(north)) / std::sqrt(2.0) / cell);
+          }
+        }
+        EXPECT_LT(deepest, 1.5) << geo::ToString(key);
+        cut += deepest > 0.25 ? 1 : 0;
+      }
+    }
+    EXPECT_GT(cut, 0) << "the outline is there";
+  }
+}
+
 }  // namespace
 }  // namespace terrace::tiler

@@ -11,6 +11,15 @@
 #include "tiler/mesh/error_allowed_at_samples.h"
 
 namespace terrace::tiler {
+namespace {
+
+// Rounding to the nearest could allow more.
+float RoundedDown(double value) {
+  const auto rounded = static_cast<float>(value);
+  return static_cast<double>(rounded) > value ? std::nextafter(rounded, 0.0F) : rounded;
+}
+
+}  // namespace
 
 tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key) {
   return LimitsOf(dem::TileEdits(model).DemandsOf(key));
@@ -18,7 +27,7 @@ tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey&
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
-  for (float& cap : demands.caps) cap = static_cast<float>(ErrorAllowedAtSamples(static_cast<double>(cap)));
+  for (float& cap : demands.caps) cap = RoundedDown(ErrorAllowedAtSamples(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
   limits.caps = std::move(demands.caps);
   limits.forced = std::move(demands.forced);
@@ -28,9 +37,7 @@ tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
 std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m) {
   std::vector<float> allowed;
   allowed.reserve(limits.weights.size());
-  for (std::size_t k = 0; k < limits.weights.size(); ++k) {
-    allowed.push_back(static_cast<float>(limits.Allowed(k, error_m)));
-  }
+  for (std::size_t k = 0; k < limits.weights.size(); ++k) allowed.push_back(RoundedDown(limits.Allowed(k, error_m)));
   return allowed;
 }
 

@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <iterator>
 #include <numeric>
+#include <utility>
 #include <vector>
 
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/sines.h"
 #include "proto/mesh/quantized_mesh.h"
@@ -125,8 +127,12 @@ tin::GreedyOptions RefineOptionsOf(const dem::ElevationModel& model, const proto
                                    tin::Criterion criterion) {
   const proto::EdgeErrors smallest(proto::kHeightResolution);
   tin::GreedyOptions options = BaseRefineOptions(samples, EdgeStepsOf(model, samples.key, smallest));
-  options.criterion = criterion;
-  options.limits = LimitsOf(model, samples.key);
+  dem::MeshDemands demands = dem::TileEdits(model).DemandsOf(samples.key);
+  // The outline of a hole is a chain of forced nodes. No edge of a Delaunay triangulation crosses a step of it, one
+  // cell or its diagonal, except the other diagonal where both are Delaunay; the data-dependent criterion would flip
+  // steps.
+  options.criterion = demands.no_triangles.empty() ? criterion : tin::Criterion::kDelaunay;
+  options.limits = LimitsOf(std::move(demands));
   return options;
 }
 

@@ -3,8 +3,8 @@
 #include <cpl_vsi.h>
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <ogr_spatialref.h>
+#include <sys/resource.h>
 
 #include <set>
 #include <string>

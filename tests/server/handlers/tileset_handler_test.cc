@@ -215,7 +215,9 @@ TEST_F(TilesetHandlerTest, TilesetsWithoutTheRangeOfATileAreWrittenAgain) {
     return dem::HeightRange{0, 1};
   };
   state_.emplace(datasets_);
-  const auto highest = [&] { return Tileset().at("root").at("children")[0].at("boundingVolume").at("region")[5].get<double>(); };
+  const auto highest = [&] {
+    return Tileset().at("root").at("children")[0].at("boundingVolume").at("region")[5].get<double>();
+  };
   EXPECT_GE(highest(), 70);
   is_readable = true;
   EXPECT_LT(highest(), 70);

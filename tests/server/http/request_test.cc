@@ -214,7 +214,8 @@ TEST(FirstLine, IsToldOfWhatIsRefused) {
   EXPECT_EQ(head.target, "/maui/layer.json?token=secret-1&x=1");
   EXPECT_TRUE(head.is_private);
   EXPECT_EQ(head.fields->origin, "");
-  EXPECT_EQ(FirstLineOf("GET / HTTP/1.1\r\nHost: a\r\nORIGIN: https://a \r\nHost: b\r\n\r\n").fields->origin, "https://a");
+  EXPECT_EQ(FirstLineOf("GET / HTTP/1.1\r\nHost: a\r\nORIGIN: https://a \r\nHost: b\r\n\r\n").fields->origin,
+            "https://a");
   for (const char* several : {"GET / HTTP/1.1\r\nOrigin: a\r\nOrigin: b\r\n\r\n", "GET / HTTP/1.1\r\n\r\nOrigin: a\r\n",
                               "GET / HTTP/1.1\r\nOrigin: a"}) {
     EXPECT_EQ(FirstLineOf(several).fields->origin, "") << several;
