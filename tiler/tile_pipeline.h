@@ -31,7 +31,7 @@ class RefinementCache;
 // Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. Another format,
 // coding or larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion.
 // Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of ReadDrawnPoints and
-// LookAlong take up to 32 MiB besides.
+// LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,

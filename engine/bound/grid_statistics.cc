@@ -99,29 +99,35 @@ BlockRange GridStatistics::Ranges(double west, double north, double east, double
 float GridStatistics::ErrorOfAverages(double west, double north, double east, double south) const {
   const int factor = reading_.factor;
   if (factor == 1) return 0;  // averages of one sample
-  const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics) {
-    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+  const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics, double shift) {
+    const auto x = static_cast<double>(member.column) - shift, y = static_cast<double>(member.row);
     const StatisticsPages::Statistics read = statistics == nullptr ? member.raster->statistics() : nullptr;
     return (statistics != nullptr ? *statistics : *read)
         .errors.Largest(factor, west - x, north - y, east - x, south - y);
   };
-  if (grid_.members().size() == 1) return error_of(grid_.members().front(), statistics_.front().get());
+  if (grid_.members().size() == 1) return error_of(grid_.members().front(), statistics_.front().get(), 0);
   constexpr float kNotTold = std::numeric_limits<float>::infinity();
   if (grid_.alignment() < factor) return kNotTold;
   int met = 0;
   float error = 0;
-  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
+  // `shift`: columns by which the member lies west of its place.
+  const auto meet = [&](const GridMember& member, const RasterStatistics* statistics, double shift) {
     const PixelRange pixels = member.pixels();
-    if (east < static_cast<double>(pixels.start_x) || west > static_cast<double>(pixels.end_x + 1) ||
+    if (east < static_cast<double>(pixels.start_x) - shift || west > static_cast<double>(pixels.end_x + 1) - shift ||
         south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
       return;
     }
     const RasterLayout& layout = member.raster->layout();
     const auto whole = [factor](int samples) { return static_cast<double>(samples / factor * factor); };
-    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+    const auto x = static_cast<double>(member.column) - shift, y = static_cast<double>(member.row);
     const bool is_inside =
         west >= x && north >= y && east <= x + whole(layout.columns) && south <= y + whole(layout.height);
-    error = ++met == 1 && is_inside ? error_of(member, statistics) : kNotTold;
+    error = ++met == 1 && is_inside ? error_of(member, statistics, shift) : kNotTold;
+  };
+  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
+    meet(member, statistics, 0);
+    // Columns beyond the last one of a grid around the Earth are its first ones.
+    if (grid_.wraps() && member.pixels().end_x >= grid_.columns()) meet(member, statistics, grid_.columns());
   });
   return error;
 }

@@ -36,7 +36,8 @@ thread_local std::string last_error;
 thread_local std::vector<std::string> first_warnings;
 
 // GDAL's handler prints messages and stops after 1,000 of them; this one stores messages for our errors and warnings.
-void CPL_STDCALL KeepMessage(CPLErr severity, CPLErrorNum, const char* message) {
+// C code of GDAL's libraries calls it, so it must not throw: without memory the message is lost.
+void CPL_STDCALL KeepMessage(CPLErr severity, CPLErrorNum, const char* message) try {
   if (severity == CE_Warning) {
     ++warnings;
     constexpr std::size_t kMaxWarnings = 8;
@@ -46,6 +47,7 @@ void CPL_STDCALL KeepMessage(CPLErr severity, CPLErrorNum, const char* message) 
   if (severity < CE_Failure) return;
   ++errors;
   last_error = message;
+} catch (const std::bad_alloc&) {
 }
 
 // File systems that open no file on the disk by themselves: memory, files within files, and the standard output, which

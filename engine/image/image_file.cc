@@ -59,7 +59,16 @@ Result<void> ImageFile::FindBands() {
                      "`gdal_translate -b 1 -b 2 -b 3 in out.tif`",
                      path_, count);
   }
-  for (int i = 0; i < 3; ++i) bands_[static_cast<std::size_t>(i)] = dataset_->GetRasterBand(i + 1);
+  for (int i = 0; i < 3; ++i) {
+    GDALRasterBand* const band = dataset_->GetRasterBand(i + 1);
+    // The interpretations from hue on, such as cyan, are of other colour models.
+    if (band->GetColorInterpretation() >= GCI_HueBand) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: band {} holds {}, colours must be red, green and blue; convert the image to RGB", path_,
+                       i + 1, GDALGetColorInterpretationName(band->GetColorInterpretation()));
+    }
+    bands_[static_cast<std::size_t>(i)] = band;
+  }
   return {};
 }
 

@@ -44,6 +44,7 @@ Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<
 // The tile as it is sent, after it was inserted into memory and the first `stores_above` stores.
 TilePtr TileTiers::Keep(const CacheKey& key, EncodedTile tile, std::size_t stores_above) {
   if (write_header_lines_ != nullptr) tile.header_lines = write_header_lines_(key.request, tile);
+  tile.bytes.shrink_to_fit();  // encoders reserve more than they fill, and memory keeps the tile for long
   auto kept = std::make_shared<const EncodedTile>(std::move(tile));
   memory_->Insert(key, kept);
   for (std::size_t i = 0; i < stores_above; ++i) stores_[i]->Insert(key, kept);

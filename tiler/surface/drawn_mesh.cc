@@ -182,7 +182,6 @@ std::optional<DrawnPoint> DrawnMesh::InOwnBucket(const dem::GeoPosition& point) 
   return best.is_met() ? std::optional(PointOf(best)) : std::nullopt;
 }
 
-// Whether a point is farther from the tile's northern and southern edge than any chord of these parallels is.
 bool DrawnMesh::IsFarFromParallels(const dem::GeoPosition& point) const {
   const double v = PlaceOf(point)[1], chord = ChordAt(key_, point.latitude);
   return v > chord + 1e-6 && v < 1 - chord - 1e-6;

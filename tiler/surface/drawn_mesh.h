@@ -69,10 +69,12 @@ class DrawnMesh {
   const geo::TileKey& key() const { return key_; }
   std::size_t bytes() const;
 
+  // Whether a point is farther from the tile's northern and southern edge than any chord of these parallels is.
+  bool IsFarFromParallels(const dem::GeoPosition& point) const;
+
  private:
   struct Meeting;
   struct PlumbLine;
-  bool IsFarFromParallels(const dem::GeoPosition& point) const;
   void FillBuckets(const std::vector<std::array<double, 2>>& places);
   std::array<double, 2> PlaceOf(const dem::GeoPosition& point) const;
   PlumbLine LineAt(const dem::GeoPosition& point) const;

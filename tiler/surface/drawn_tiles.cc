@@ -59,6 +59,14 @@ Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
   if (meshes_[number] == nullptr) {
     Result<std::shared_ptr<const DrawnMesh>> made = find_mesh_(numbers_.keys()[number]);
     if (!made) return tl::unexpected(std::move(made).error());
+    mesh_bytes_ += (*made)->bytes();
+    if (mesh_bytes_ > kMaxMeshBytes) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "{}: the meshes of their tiles take more than {} MiB; ask for fewer tiles at once, or for a larger "
+          "error",
+          numbers_.subject(), kMaxMeshBytes >> 20);
+    }
     meshes_[number] = *std::move(made);
   }
   return meshes_[number].get();
@@ -66,20 +74,25 @@ Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
 
 Result<DrawnTiles::Reading> DrawnTiles::ReadAt(const dem::GeoPosition& point, std::uint32_t own,
                                                const std::stop_token& stop) {
-  const auto read = [&](std::uint32_t tile) -> Result<Reading> {
-    const Result<const DrawnMesh*> mesh = MeshOf(tile);
+  const Result<const DrawnMesh*> inside = MeshOf(own);
+  if (!inside) return tl::unexpected(inside.error());
+  if (const std::optional<DrawnPoint> met = (*inside)->InOwnBucket(point)) return Reading{*met, own};
+  const std::optional<std::uint32_t> neighbour = (*inside)->IsFarFromParallels(point)
+                                                     ? std::nullopt
+                                                     : numbers_.NumberBeside(NeighbourAt(numbers_.keys()[own], point));
+  const DrawnMesh* beyond = nullptr;
+  if (neighbour) {
+    const Result<const DrawnMesh*> mesh = MeshOf(*neighbour);
     if (!mesh) return tl::unexpected(mesh.error());
-    if (const std::optional<DrawnPoint> met = (*mesh)->InOwnBucket(point)) return Reading{*met, tile};
-    // On shallow levels all triangles are examined.
-    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
-    return Reading{(*mesh)->Nearest(point), tile};
-  };
-  const Result<Reading> inside = read(own);
-  if (!inside || !inside->point.is_beside) return inside;
-  const std::optional<std::uint32_t> neighbour = numbers_.NumberBeside(NeighbourAt(numbers_.keys()[own], point));
-  if (!neighbour) return inside;
-  const Result<Reading> beyond = read(*neighbour);
-  return !beyond || !beyond->point.is_beside ? beyond : inside;
+    beyond = *mesh;
+    if (const std::optional<DrawnPoint> met = beyond->InOwnBucket(point)) return Reading{*met, *neighbour};
+  }
+  // On shallow levels all triangles are examined.
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
+  const DrawnPoint nearest = (*inside)->Nearest(point);
+  if (!nearest.is_beside || beyond == nullptr) return Reading{nearest, own};
+  const DrawnPoint there = beyond->Nearest(point);
+  return there.is_beside ? Reading{nearest, own} : Reading{there, *neighbour};
 }
 
 }  // namespace terrace::tiler

@@ -22,6 +22,8 @@ namespace terrace::tiler {
 
 // Limit of the tiles that the points or rays of one request lie in: each of them may have to be made.
 inline constexpr std::size_t kMaxTilesRead = 64;
+// Limit of the meshes that one request keeps. Usual ones take some hundred KB, those at the limit of vertices 5 MB.
+inline constexpr std::size_t kMaxMeshBytes = std::size_t{256} << 20;
 
 // Whether a tile exists.
 using HasTile = std::function<bool(const geo::TileKey&)>;
@@ -55,6 +57,7 @@ class TileNumbers {
 
   const std::vector<geo::TileKey>& keys() const { return keys_; }  // by number
   int level() const { return level_; }
+  std::string_view subject() const { return subject_; }
 
  private:
   std::optional<std::uint32_t> Find(const geo::TileKey& key) const;
@@ -76,7 +79,7 @@ class DrawnTiles {
       : numbers_(std::move(has_tile), level, subject), find_mesh_(std::move(find_mesh)) {}
 
   TileNumbers& numbers() { return numbers_; }
-  // Errors: those of `find_mesh`.
+  // kInvalidArgument: the meshes of the request take more than kMaxMeshBytes. Other errors: those of `find_mesh`.
   Result<const DrawnMesh*> MeshOf(std::uint32_t number);
 
   struct Reading {
@@ -85,13 +88,14 @@ class DrawnTiles {
   };
   // The surface at a point in the tile with the number `own`. Near its northern or southern edge the plumb line may
   // meet no triangle of this tile. If it meets one of the neighbour there, the surface is the neighbour's. kCancelled:
-  // a stop was requested.
+  // a stop was requested. Other errors: those of MeshOf.
   Result<Reading> ReadAt(const dem::GeoPosition& point, std::uint32_t own, const std::stop_token& stop);
 
  private:
   TileNumbers numbers_;
   FindMesh find_mesh_;
   std::vector<std::shared_ptr<const DrawnMesh>> meshes_;  // by number; null: not made yet
+  std::size_t mesh_bytes_ = 0;
 };
 
 }  // namespace terrace::tiler

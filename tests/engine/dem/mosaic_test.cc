@@ -435,5 +435,32 @@ TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {
   EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
 }
 
+// Of two rasters on one grid around the Earth the first lies across its last column.
+TEST(Mosaic, CertifiedErrorCountsRastersAcrossTheLastColumn) {
+  const TempDir dir;
+  RasterSpec across{.width = 32, .height = 64};
+  across.geo_transform = {176, 0.25, 0, 24, 0, -0.25};
+  across.value = [](int column, int row) {  // single summits between 181 and 183 degrees
+    return column >= 20 && column < 28 && column % 2 == 0 && row % 2 == 0 ? 1000.0 : 0.0;
+  };
+  RasterSpec globe{.width = 1440, .height = 720};
+  globe.geo_transform = {-180, 0.25, 0, 90, 0, -0.25};
+  globe.value = [](int, int) { return 0.0; };
+  const std::vector<DemFile> files = {{WriteRaster(dir, across, "across.tif"), {}},
+                                      {WriteRaster(dir, globe, "globe.tif"), {}}};
+  const auto model = OpenOrFail(files);
+  ASSERT_NE(model, nullptr);
+  for (int level = 0; level <= std::min(1, model->max_level()); ++level) {
+    const geo::Lattice& lattice = model->LatticeOf(level);
+    const geo::TileKey key{level, 0, geo::TileRows(level) / 2};
+    const auto tile = model->Read(key);
+    ASSERT_TRUE(tile) << tile.error().message;
+    float highest = 0;
+    for (const float height : tile->heights) highest = std::max(highest, height);
+    ASSERT_LT(highest, 600) << lattice.cells << ": averages";
+    EXPECT_GE(tile->source_error_m, 1000 - highest) << "level " << level;
+  }
+}
+
 }  // namespace
 }  // namespace terrace::dem

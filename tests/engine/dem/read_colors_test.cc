@@ -176,6 +176,15 @@ TEST(ReadColors, RefusesAnImageThatDoesNotFit) {
   const std::string dem = WriteRaster(dir, {.width = 30, .height = 20, .geo_transform = {8, .05, 0, 50, 0, -.05}});
   const std::string plain =
       WriteColors(dir, {.width = 31, .height = 20, .georeferenced = false, .crs = ""}, "plain.tif");
+  ColorSpec inks{.bands = 4};
+  const std::string printed = WriteColors(dir, inks, "printed.tif");
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(printed.c_str(), GDAL_OF_RASTER));  // stated beside the file
+    for (int i = 0; i < 4; ++i) {
+      dataset->GetRasterBand(i + 1)->SetColorInterpretation(static_cast<GDALColorInterp>(GCI_CyanBand + i));
+    }
+  }
+  ExpectRefused(printed, dem, {"printed.tif: band 1 holds Cyan", "RGB"});
   ExpectRefused(plain, dem, {"plain.tif has 31 x 20", "30 x 20", "no georeference", "-outsize 30 20", "-a_ullr"});
   ColorSpec beside = Gradient();
   beside.geo_transform[0] = 8.2;

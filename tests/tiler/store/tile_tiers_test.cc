@@ -90,6 +90,18 @@ TEST_F(TileTiersTest, AsksInOrderAndKeepsABuiltTileInAllTiers) {
   EXPECT_EQ(tiers.memory().Find(KeyAt(2)), nullptr);
 }
 
+// Encoders reserve what the format may need at most.
+TEST_F(TileTiersTest, KeepsNoMoreMemoryThanItCounts) {
+  TileTiers tiers(1 << 20, {});
+  const Result<TilePtr> built = tiers.FindOrBuild(KeyAt(1), []() -> Result<EncodedTile> {
+    EncodedTile tile;
+    tile.bytes.assign(100'000, 'a');
+    tile.bytes.resize(500);
+    return tile;
+  });
+  EXPECT_LT((*built)->bytes.capacity(), 600u);
+}
+
 TEST_F(TileTiersTest, AsksNobodyForWhatIsInMemory) {
   TileTiers tiers(1 << 20, {disk});
   const Result<TilePtr> built = tiers.FindOrBuild(KeyAt(1), BuildOf("new"));
