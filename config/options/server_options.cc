@@ -175,7 +175,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
            "their averages, and the averages for shallow tiles if the source has no such overviews: about 1.4 bytes "
            "per sample, 18 MB for a raster of 3601 x 3601. Progress goes to stderr; an interrupted pass continues at "
            "the next start. Sources are identified by path, size and times, so a replaced source is read again. "
-           "Several servers may share the folder. Without the folder, or if it fails, averages are "
+           "Several servers of one machine may share the folder. Without the folder, or if it fails, averages are "
            "[kept in memory](operations.md#cache_dir) as far as they fit. Relative to the folder of the file",
        .codec = CacheDir()},
       {.key = "cache_dir_bytes",

@@ -261,7 +261,8 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
     say(fmt::format("{} samples of {}", evidence.at_value[i], PlainNumber(kUsualNodata[i])));
   }
   if (has_collar) {
-    detected.values.push_back((0 - rules.offset) / rules.scale);
+    const double zero = (0 - rules.offset) / rules.scale, whole = std::round(zero);
+    detected.values.push_back(rules.Metres(whole) == 0 ? whole : zero);  // the quotient may be inexact
     say("a collar of zeros");
   }
 
