@@ -33,7 +33,7 @@ ROOT = pathlib.Path(sys.argv.pop(1)).resolve()
 HERE = pathlib.Path(__file__).resolve().parent
 RULES = ROOT / "deploy/prometheus/terrace.rules.yml"
 DASHBOARD = json.loads((ROOT / "deploy/grafana/terrace.json").read_text())
-COMPOSE = [ROOT / "docker" / file for file in ("compose.yaml", "bake/compose.yaml", "cluster/compose.yaml")]
+COMPOSE = [ROOT / "docker" / file for file in ("compose.yaml", "cluster/compose.yaml", "bake/compose.yaml")]
 NODE = shutil.which("node") or shutil.which("nodejs")
 MODULES = HERE / "node_modules"
 

@@ -77,22 +77,21 @@ Result<DrawnTiles::Reading> DrawnTiles::ReadAt(const dem::GeoPosition& point, st
   const Result<const DrawnMesh*> inside = MeshOf(own);
   if (!inside) return tl::unexpected(inside.error());
   if (const std::optional<DrawnPoint> met = (*inside)->InOwnBucket(point)) return Reading{*met, own};
-  const std::optional<std::uint32_t> neighbour = (*inside)->IsFarFromParallels(point)
-                                                     ? std::nullopt
-                                                     : numbers_.NumberBeside(NeighbourAt(numbers_.keys()[own], point));
-  const DrawnMesh* beyond = nullptr;
-  if (neighbour) {
-    const Result<const DrawnMesh*> mesh = MeshOf(*neighbour);
-    if (!mesh) return tl::unexpected(mesh.error());
-    beyond = *mesh;
-    if (const std::optional<DrawnPoint> met = beyond->InOwnBucket(point)) return Reading{*met, *neighbour};
+  std::uint32_t neighbour = own;
+  if (!(*inside)->IsFarFromParallels(point)) {
+    neighbour = numbers_.NumberBeside(NeighbourAt(numbers_.keys()[own], point)).value_or(own);
+  }
+  const Result<const DrawnMesh*> beyond = MeshOf(neighbour);
+  if (!beyond) return tl::unexpected(beyond.error());
+  if (neighbour != own) {
+    if (const std::optional<DrawnPoint> met = (*beyond)->InOwnBucket(point)) return Reading{*met, neighbour};
   }
   // On shallow levels all triangles are examined.
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
   const DrawnPoint nearest = (*inside)->Nearest(point);
-  if (!nearest.is_beside || beyond == nullptr) return Reading{nearest, own};
-  const DrawnPoint there = beyond->Nearest(point);
-  return there.is_beside ? Reading{nearest, own} : Reading{there, *neighbour};
+  if (!nearest.is_beside || neighbour == own) return Reading{nearest, own};
+  const DrawnPoint there = (*beyond)->Nearest(point);
+  return there.is_beside ? Reading{nearest, own} : Reading{there, neighbour};
 }
 
 }  // namespace terrace::tiler
