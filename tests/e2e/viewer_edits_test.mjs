@@ -180,11 +180,19 @@ describe('edits in the viewer', () => {
     for (const [i, [x, y]] of places.entries()) {
       // A place is known where ground is drawn.
       await page.waitForFunction(() => !terrace.globe.loading && terrace.globe.drawn().tiles > 1, undefined, kWait);
-      await page.mouse.click(x, y);
-      await page.waitForFunction((count) => terrace.state.draft.corners.length === count, i + 1, kWait);
-      await page.waitForTimeout(400);  // two clicks at once are a double click
+      await page.mouse.dblclick(x, y);
+      await page.waitForFunction((count) => terrace.state.draft.corners.length >= count, i + 1, kWait);
+      await page.waitForTimeout(600);  // two clicks at once are a double click
+      assert.equal(await page.evaluate(() => terrace.state.draft.corners.length), i + 1, 'a double click sets one corner');
     }
-    await page.locator('#draft-height').fill('512.5');
+    await page.evaluate(() => terrace.state.draft.add({ ...terrace.state.draft.corners.at(-1) }));
+    assert.equal(await page.evaluate(() => terrace.state.draft.corners.length), places.length, 'nor is a corner set twice');
+    const height = page.getByRole('spinbutton', { name: 'Height above the ellipsoid' });
+    await height.fill('');
+    assert.ok(await page.locator('#draft-save').isDisabled(), 'without a height');
+    await height.fill('512.5');
+    await page.locator('#draft-blend').fill('100001');
+    assert.equal(await page.evaluate(() => terrace.state.draft.blend), 100000, 'the most that terrace takes');
     await page.locator('#draft-blend').fill('30');
     await page.waitForFunction(() => /Raises the ground by up to .* lowers it/.test(document.getElementById('draft-text').textContent), undefined, kWait);
     assert.ok(await page.evaluate(() => terrace.globe.scene.primitives.contains(terrace.state.draft.surface)));
