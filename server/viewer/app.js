@@ -103,7 +103,7 @@ async function show() {
     globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
     if (!isLatest()) return;
-    panel.setMessage(undefined);
+    if (!watch.isLost) panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
     if (!isLatest()) return;
