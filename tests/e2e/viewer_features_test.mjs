@@ -316,6 +316,7 @@ describe('features of the viewer', () => {
     await flat.getByText('no WebGL 2').waitFor({ timeout: 30000 });
     await flat.waitForFunction(() => {
       const canvas = document.querySelector('#globe canvas');
+      if (!canvas?.width) return false;
       const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
       return new Set(new Uint32Array(data.buffer)).size > 500;
     }, undefined, kWait);
