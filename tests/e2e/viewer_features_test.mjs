@@ -213,7 +213,7 @@ describe('features of the viewer', () => {
     await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, kWait);
     const state = () => page.evaluate(() => [terrace.state.colouring, terrace.state.sun, terrace.state.right]);
     const before = await state();
-    assert.match(page.url(), /colours=slope&sun=\d{4}-06-21T18:30&right=4/);
+    await page.waitForURL(/colours=slope&sun=\d{4}-06-21T18:30&right=4/);
     await assertAccessible(page, 'all settings, two errors');
     await page.reload();
     await settled();

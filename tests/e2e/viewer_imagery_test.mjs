@@ -75,7 +75,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     await settled();
     for (let i = 0; i < 60 && await shareOfMagenta(page) > 0; ++i) await page.waitForTimeout(500);
     assert.equal(await shareOfMagenta(page), 0);
-    assert.ok(!/imagery/.test(page.url()));
+    await page.waitForURL((url) => !/imagery/.test(url.hash));
     await page.close();
   });
 

@@ -196,7 +196,7 @@ describe('the viewer', () => {
     const view = await page.evaluate(() => ({ fraction: terrace.state.fraction, right: terrace.state.right, sun: terrace.state.sun,
       exaggeration: terrace.globe.exaggeration, colouring: terrace.state.colouring, split: terrace.globe.split }));
     assert.deepEqual({ ...view, fraction: 0 }, { fraction: 0, right: undefined, sun: undefined, exaggeration: 10, colouring: 'height', split: 0.5 });
-    assert.match(page.url(), /camera=(9|10)\.\d+,4[45]\.\d+,/, 'the first dataset is in view');
+    await page.waitForURL(/camera=(9|10)\.\d+,4[45]\.\d+,/);  // the first dataset is in view
     const decoded = (hash) => page.evaluate(async (text) => (await import('/viewer/view_url.js')).decodeView(text), hash);
     for (const camera of ['a,b,c,d,e', '1,2,3', '', 'NaN,0,0,0,0', '1,2,3,4,5,6', '8,46,1e9,0,0', '8,46,-1e5,0,0', '8,91,5000,0,0', ',,,,', '8,46,,0,0']) {
       assert.equal((await decoded(`#dataset=x&camera=${camera}`)).camera, undefined, camera);

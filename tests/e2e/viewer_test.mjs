@@ -142,7 +142,7 @@ describe('the viewer', () => {
     await page.locator('#splitter').focus();
     await page.keyboard.press('ArrowLeft');
     assert.equal(await page.evaluate(() => terrace.globe.split), 0.48);
-    assert.match(page.url(), /&tiles3d&split=0\.48/);
+    await page.waitForURL(/&tiles3d&split=0\.48/);
 
     // Slopes without exaggeration, on both sides; and a browser that has had enough changes of the address.
     const tried = await page.evaluate(() => {
@@ -211,6 +211,7 @@ describe('the viewer', () => {
       return [terrace.state.dataset.name, Number(terrace.state.fraction.toPrecision(6)), terrace.state.contours, ...place];
     });
     const before = await state();
+    await page.waitForURL(/&contours/);
     await page.reload();
     await settle(page);
     assert.deepEqual(await state(), before);
@@ -252,7 +253,7 @@ describe('the viewer', () => {
     const lost = await openPage(browser, `${url}/#dataset=nowhere`);
     await lost.locator('#message').waitFor({ timeout: kSettleMs });
     assert.match(await lost.locator('#message').innerText(), /no dataset nowhere on this server; this is /);
-    assert.match(lost.url(), /#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/, 'the address has what is shown');
+    await lost.waitForURL(/#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/);  // what is shown
     await lost.close();
   });
 
