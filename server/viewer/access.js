@@ -43,7 +43,7 @@ export class Access {
     if (!/^[\w.~+/=-]*$/.test(token)) throw new UnknownToken();
     const response = await fetch("/datasets", { headers: headersOf(token), signal: AbortSignal.timeout(kPatienceMs) });
     if (response.status === 401) throw new UnknownToken();
-    if (!response.ok) throw new Error(`the server answered ${response.status} to /datasets`);
+    if (!response.ok) throw Object.assign(new Error(`the server answered ${response.status} to /datasets`), { status: response.status });
     const { datasets, preparing = [], more_with_token: moreWithToken = false } = await response.json();
     return { datasets: datasets.map(withDefaults), preparing, moreWithToken };
   }
@@ -62,15 +62,12 @@ export class Access {
     return heightsUrl(dataset, [{ longitude, latitude }], { locations: `${latitude},${longitude}` });
   }
 
-  // Metres above the ellipsoid; undefined if the server has no height there.
+  // Metres above the ellipsoid; undefined if the dataset has no height there. Throws if the server does not say.
   async heightAt(dataset, longitude, latitude) {
-    try {
-      const url = this.heightUrl(dataset, longitude, latitude);
-      const reply = await (take(url) ?? fetch(url, { headers: this.headers, signal: AbortSignal.timeout(kPatienceMs) }));
-      return reply.ok ? (await reply.json()).results[0].elevation ?? undefined : undefined;
-    } catch {
-      return undefined;
-    }
+    const url = this.heightUrl(dataset, longitude, latitude);
+    const reply = await (take(url) ?? fetch(url, { headers: this.headers, signal: AbortSignal.timeout(kPatienceMs) }));
+    if (!reply.ok) throw new Error(`the server answered ${reply.status} to ${url}`);
+    return (await reply.json()).results[0].elevation ?? undefined;
   }
 
   // Heights at {longitude, latitude}: metres, undefined where the dataset has none.

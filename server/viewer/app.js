@@ -1,5 +1,6 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
 import { pendingText, UnknownToken } from "/viewer/access.js";
+import { Address } from "/viewer/address.js";
 import { access, firstList, startOf } from "/viewer/early.js";
 import { boxOf, defaultFraction, discOf, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
@@ -30,6 +31,7 @@ const state = { datasets: [], preparing: [], moreWithToken: false, dataset: unde
                 hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, retry: undefined, problems: [], shown: undefined, region: undefined };
 
+const globe = new Globe(document.getElementById("globe"), complain, missTile);
 const panel = new Panel({
   dataset: (name) => choose(name),
   home: () => state.dataset && lookAt(firstRegion(state.dataset), flightSeconds()),
@@ -54,9 +56,9 @@ const panel = new Panel({
 const shows = new Turns();
 const views = new Turns();  // by the address or the list of datasets
 const toolClicks = new Turns();
-const card = new TokenCard((token) => useToken(token));
+const card = new TokenCard((token) => useToken(token), () => state.isRefused && useToken(""));
 const traffic = new Traffic();
-const globe = makeGlobe();
+const address = new Address(fragmentOfView);
 
 const watch = new Watch({ list: () => list(), onLost: (error) => lose(error), onList: (wasLost) => follow(wasLost) });
 
@@ -68,15 +70,6 @@ function complain(problem) {
 function ask(reason) {
   panel.setActivity("");
   card.ask(reason, state.datasets.length > 0);
-}
-
-function makeGlobe() {
-  try {
-    return new Globe(document.getElementById("globe"), complain, missTile);
-  } catch (error) {
-    complain(`This browser cannot draw the globe: ${error.message}`);
-    throw error;
-  }
 }
 
 // A finer one where there is none.
@@ -110,7 +103,7 @@ async function show() {
     globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
     if (!isLatest()) return;
-    panel.setMessage(undefined);
+    if (!watch.isLost) panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
     if (!isLatest()) return;
@@ -137,11 +130,11 @@ function tryLater() {
 }
 
 // The dataset list has no heights of a part of a dataset, so the server is asked for one. If another view is wanted before
-// it answers, this one is dropped.
+// it answers, or the user steers, this one is dropped.
 async function lookAt(region, seconds) {
   state.region = region;
   const { longitude, latitude } = discOf(region);
-  const ground = region.isPart ? await access.heightAt(state.dataset, longitude, latitude) : undefined;
+  const ground = region.isPart ? await access.heightAt(state.dataset, longitude, latitude).catch(() => undefined) : undefined;
   if (state.region === region) globe.lookAt({ ...region, ground }, seconds);
 }
 
@@ -168,7 +161,8 @@ function lose(error) {
     state.isRefused = true;
     return ask("The server does not know the token of this page any more.");
   }
-  panel.setMessage("The server does not answer. The page goes on as soon as it does.");
+  const problem = error.status ? `The server answers ${error.status}.` : "The server does not answer.";
+  panel.setMessage(`${problem} The page goes on as soon as it can.`);
 }
 
 // Tells about the dataset that is waited for, or else shown, if the server is preparing it; without one, about all that it
@@ -274,7 +268,7 @@ function setMode(name) {
 }
 
 async function copyLink() {
-  remember();
+  address.write();
   try {
     await navigator.clipboard.writeText(location.href);
     panel.note("The link to this view is copied.");
@@ -342,12 +336,13 @@ function setSwitches({ contours, wireframe, tiles3d, edits, imagery, right }) {
   remember();
 }
 
-// Updates the address bar to the current view without adding to the history.
 function remember() {
-  if (!state.ready || state.wanted) return;
-  const view = { ...state, dataset: state.dataset.name, camera: globe.camera, exaggeration: globe.exaggeration,
-                 split: globe.split };
-  history.replaceState(undefined, "", encodeView(view));
+  if (state.ready && !state.wanted) address.follow();
+}
+
+function fragmentOfView() {
+  if (!state.ready || state.wanted) return undefined;
+  return encodeView({ ...state, dataset: state.dataset.name, camera: globe.camera, exaggeration: globe.exaggeration, split: globe.split });
 }
 
 async function apply(view) {
@@ -415,8 +410,9 @@ async function useToken(token) {
     return ask(error instanceof UnknownToken ? "The server does not know this token." : `That failed: ${error.message}.`);
   }
   access.token = token;
+  state.isRefused = false;
   keep(found);
-  if (state.datasets.length === 0) return ask("There is no dataset for this token.");
+  if (state.datasets.length === 0) return ask(token ? "There is no dataset for this token." : "The datasets of this server need a token.");
   card.close();
   panel.setMessage(undefined);
   await apply(state.wanted ?? decodeView(location.hash));
@@ -426,7 +422,7 @@ async function read(position) {
   state.picked = position;
   panel.setReadout(position);
   if (!position) return;
-  const height = await access.heightAt(state.dataset, position.longitude, position.latitude);
+  const height = await access.heightAt(state.dataset, position.longitude, position.latitude).catch(() => undefined);
   if (state.picked === position) panel.setReadout(position, height);
 }
 
@@ -434,8 +430,10 @@ async function start() {
   panel.setActivity("loading");
   globe.onKey = pressKey;
   globe.onPick(read);
+  globe.onSteer = () => state.ready && (state.region = undefined);
   onTheme((isLight) => (globe.isLight = isLight));
   globe.scene.camera.moveEnd.addEventListener(remember);
+  globe.scene.canvas.addEventListener("webglcontextlost", () => panel.setLastMessage("The browser has dropped the picture. Reload the page."));
   addEventListener("hashchange", () => apply(decodeView(location.hash)));
   try {
     keep(await firstList);

@@ -10,6 +10,7 @@ import { Turns } from "/viewer/turns.js";
 
 const kSamples = 400;
 const kMaxHeight = 20000;  // metres; the server takes no others
+const kMaxBlend = 100000;  // metres; likewise
 const kMinArea = 0.01;  // square metres; less has corners on one line
 const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
 const byId = (id) => document.getElementById(id);
@@ -55,7 +56,10 @@ export class Draft {
     this.onMode(undefined);
   }
 
+  // The last corner again, as by a double click, is none.
   add(ground) {
+    const last = this.corners.at(-1);
+    if (last && last.longitude === ground.longitude && last.latitude === ground.latitude) return undefined;
     this.corners.push(ground);
     return this.#change();
   }
@@ -81,7 +85,11 @@ export class Draft {
   }
 
   get blend() {
-    return Math.max(0, byId("draft-blend").valueAsNumber || 0);
+    return Math.max(0, Math.min(kMaxBlend, byId("draft-blend").valueAsNumber || 0));
+  }
+
+  get #hasHeight() {
+    return !Number.isNaN(byId("draft-height").valueAsNumber);
   }
 
   // Why the corners make no polygon; undefined: they make one.
@@ -164,7 +172,7 @@ export class Draft {
   #describe() {
     byId("draft-undo").hidden = this.corners.length === 0;
     // The server refuses a file with features outside the data.
-    byId("draft-save").disabled = !this.#isPolygon || isBeside(this.corners, this.dataset().bounds);
+    byId("draft-save").disabled = !this.#isPolygon || !this.#hasHeight || isBeside(this.corners, this.dataset().bounds);
     byId("draft-text").textContent = this.#text();
   }
 
@@ -173,6 +181,7 @@ export class Draft {
     if (!this.#isPolygon) return this.#fault;
     const area = Math.abs(signedArea(corners));
     const size = formatArea(area);
+    if (!this.#hasHeight) return `${size}. Enter the height.`;
     if (!ground) return `${size}.`;
     const { known, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
     if (known === 0) return `${size}; no heights there.`;

@@ -85,6 +85,9 @@ class FlatMap {
       this.canvas.width = 0;
     }
     this.dataset = dataset;
+    const [west, south, east, north] = dataset.bounds;
+    const [top, bottom] = [toY(north), toY(south)];
+    if (top === bottom) throw new Error(`${dataset.name} is beyond 85 degrees, where the flat map ends.`);
     if (!dataset.urls.tiles_json) throw new Error(`${dataset.name} has no height images, of which the flat map is made.`);
     const reply = await fetch(dataset.urls.tiles_json, { headers: this.access.headers });
     if (!reply.ok) throw new Error(`the server answered ${reply.status} to tiles.json`);
@@ -93,9 +96,7 @@ class FlatMap {
     this.#tiles.clear();
     this.template = description.tiles[0];
     this.maxLevel = description.maxzoom ?? 14;
-    const [west, south, east, north] = dataset.bounds;
     const [left, right] = [toX(west), toX(east) + (east < west ? 1 : 0)];
-    const [top, bottom] = [toY(north), toY(south)];
     this.box = { left, right, top, bottom };
     this.centre = [(left + right) / 2, (top + bottom) / 2];
     const { clientWidth, clientHeight } = this.canvas.parentElement;
@@ -256,12 +257,17 @@ class FlatMap {
   }
 }
 
-// The list of datasets; while the server prepares the only ones, waits for it, and tells.
+// The list of datasets. While it cannot be read, or the server prepares the only ones, tells so and asks again.
 async function listWhenThere(fail) {
-  for (let list = await firstList; ; list = await access.list().catch(() => list)) {
-    byId("message").hidden = true;
-    if (list.datasets.length > 0 || list.preparing.length === 0) return list;
-    fail(list.preparing.map((pending) => pendingText(pending)).join(" "));
+  for (let asked = firstList; ; asked = access.list()) {
+    try {
+      const list = await asked;
+      byId("message").hidden = true;
+      if (list.datasets.length > 0 || list.preparing.length === 0) return list;
+      fail(list.preparing.map((pending) => pendingText(pending)).join(" "));
+    } catch (error) {
+      fail(`The list of datasets could not be read: ${error.message}. Is the server running?`);
+    }
     await new Promise((resolve) => setTimeout(resolve, kPendingMs));
   }
 }
@@ -272,11 +278,12 @@ export async function startFlatMap() {
   byId("globe").setAttribute("aria-label", "Map. Arrow keys move it, plus and minus zoom, Enter reads the height in the middle.");
   const say = (text) => Object.assign(byId("note"), { textContent: text, hidden: !text });
   const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
-  say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
+  say("This browser has no WebGL 2 that the globe can use. This is a flat map of the same heights.");
   try {
     const { datasets, preparing, moreWithToken } = await listWhenThere(fail);
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    const named = () => new URLSearchParams(location.hash.slice(1)).get("dataset");
     const shows = new Turns();
     const clicks = new Turns();
     // Returns whether no other dataset was wanted meanwhile.
@@ -286,7 +293,7 @@ export async function startFlatMap() {
       byId("dataset").value = dataset.name;
       byId("readout").hidden = true;
       document.title = `${dataset.name} · terrace`;
-      history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
+      if (named() !== dataset.name) history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
       byId("attribution").textContent = dataset.attribution ?? "";
       byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
@@ -294,7 +301,6 @@ export async function startFlatMap() {
       await map.show(dataset).catch((error) => isLatest() && fail(error));
       return isLatest();
     };
-    const named = () => new URLSearchParams(location.hash.slice(1)).get("dataset");
     byId("dataset").addEventListener("change", (event) => show(event.target.value));
     for (const name of ["contours", "imagery"]) {
       byId(name).addEventListener("change", ({ target }) => map.setLook({ [name]: target.checked }));
@@ -304,10 +310,11 @@ export async function startFlatMap() {
       if (!map.template) return;
       const isLatest = clicks.begin();
       const { dataset } = map;
-      const height = await access.heightAt(dataset, longitude, latitude);
+      const text = await access.heightAt(dataset, longitude, latitude).then((height) =>
+        (height === undefined ? "No height there" : formatPosition({ longitude, latitude, height })), () => "The height could not be read");
       if (!isLatest() || dataset !== map.dataset) return;
       byId("readout").hidden = false;
-      byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
+      byId("readout").textContent = text;
     };
     const open = async () => {
       const wanted = named();

@@ -13,10 +13,12 @@ export const fractionOfStep = (step) => 2 ** (-step / 2);
 export const stepOfFraction = (fraction) =>
   Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
-// Centre and size of [west, south, east, north] in degrees; east < west means across the antimeridian.
+// Centre and size of [west, south, east, north] in degrees; east < west means across the antimeridian. The centre's
+// longitude is within -180 to 180.
 export function boxOf([west, south, east, north]) {
   const width = east >= west ? east - west : east - west + 360;
-  return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
+  const middle = west + width / 2;
+  return { longitude: middle > 180 ? middle - 360 : middle, latitude: (south + north) / 2, width, height: north - south };
 }
 
 // Degrees between the equator and what of [west, south, east, north] is nearest to it.

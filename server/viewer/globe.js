@@ -9,13 +9,15 @@ import { boxOf, discOf, isGlobal, kGlobalDistance, pixelTolerance, viewDistance 
 import { kNearest, steerByKeyboard } from "/viewer/keyboard.js";
 import { niceInterval } from "/viewer/colours.js";
 import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.js";
-import { Overlay } from "/viewer/overlay.js";
+import { Overlay, raised } from "/viewer/overlay.js";
 import { Sky } from "/viewer/sky.js";
 import { Tiles3d } from "/viewer/tiles3d.js";
 import { Turns } from "/viewer/turns.js";
 
 // Renderers without a GPU, for which antialiasing is too slow.
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
+const kDoubleClickMs = 500;
+const kDoubleClickPixels = 5;
 const kWorldMiddle = [82, 18];  // longitude and latitude at the centre of a view of the whole Earth: the highest ground
 
 // The widget fetches a table of the Earth's heights for objects that lie on the ground, which this page does not have.
@@ -36,16 +38,24 @@ function startTileWorker() {
 export class Globe {
   #shows = new Turns();  // only the latest may set the terrain
 
-  // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read.
+  // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read. Throws an error named
+  // NoGlobe if the browser cannot draw it.
   constructor(container, onError, onTileError) {
     startTileWorker();
     const credits = document.createElement("div");  // the page states the attribution itself
-    this.widget = new CesiumWidget(container, {
-      baseLayer: false, skyBox: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
-      requestRenderMode: true, maximumRenderTimeChange: Infinity, useBrowserRecommendedResolution: false,
-      useDefaultRenderLoop: false,  // until there is a dataset: a frame of nothing takes time as well
-    });
-    this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
+    try {
+      this.widget = new CesiumWidget(container, {
+        baseLayer: false, skyBox: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
+        requestRenderMode: true, maximumRenderTimeChange: Infinity, useBrowserRecommendedResolution: false,
+        useDefaultRenderLoop: false,  // until there is a dataset: a frame of nothing takes time as well
+      });
+    } catch (error) {
+      container.replaceChildren();
+      throw Object.assign(new Error(error.message), { name: "NoGlobe" });
+    }
+    const limitPixels = () => (this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio);
+    limitPixels();
+    addEventListener("resize", limitPixels);  // the window may be on another screen
     this.scene = this.widget.scene;
     this.container = container;
     Object.assign(this, { onError, onTileError });
@@ -58,6 +68,7 @@ export class Globe {
     this.sky = new Sky(this.scene, this.material.uniforms);
     this.overlay = new Overlay(this.scene, container);
     this.onClick = undefined;  // while set, gets clicked ground instead of onPick's callback
+    this.onSteer = undefined;  // called when the user begins to move the camera
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
     this.scene.camera.moveStart.addEventListener(() => (this.isMoving = true));
@@ -123,6 +134,7 @@ export class Globe {
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
     setHeights(this.material, this.scene.context, dataset.heights);
+    this.overlay.lowest = dataset.heights.min;
     const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
     this.material.uniforms.box = { x, y, z, w };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
@@ -278,11 +290,20 @@ export class Globe {
     this.scene.requestRender();
   }
 
+  // Metres from the camera to the ground in the middle of the view. Where none is drawn, to the ellipsoid, or to one below
+  // the camera if that is deeper.
+  get #distance() {
+    const { camera, canvas, ellipsoid } = this.scene;
+    const at = { x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 };
+    const above = Math.max(this.clearance, kNearest);
+    const level = Math.min(0, camera.positionCartographic.height - above);
+    const middle = this.#pickWorld(at) ?? camera.pickEllipsoid(at, raised(ellipsoid, level));
+    return middle ? Cartesian3.distance(middle, camera.positionWC) : above * 3;
+  }
+
   // Adapts to the distance: depth of tiles, contour interval, strength of shading, roundness of the globe.
   adaptToCamera() {
-    const { camera, canvas } = this.scene;
-    const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
-    const distance = middle ? Cartesian3.distance(middle, camera.positionWC) : camera.positionCartographic.height * 3;
+    const distance = this.#distance;
     this.scene.globe.maximumScreenSpaceError = pixelTolerance(distance);
     const { uniforms } = this.material;
     this.interval = niceInterval(Math.max(1, Math.min(distance * 0.0022, 2000)));
@@ -301,6 +322,17 @@ export class Globe {
     const { canvas, camera } = this.scene;
     const handler = new ScreenSpaceEventHandler(canvas);
     const middle = () => ({ x: canvas.clientWidth / 2, y: canvas.clientHeight / 2 });
+    const steer = () => this.onSteer?.();
+    for (const type of ["pointerdown", "wheel"]) canvas.addEventListener(type, steer, { passive: true });
+    // The second click of a double click is none. A slow machine handles both late, so the time of the event counts.
+    let released = 0;
+    let last = { at: -Infinity };
+    canvas.addEventListener("pointerup", ({ timeStamp }) => (released = timeStamp), true);
+    const isSecond = ({ x, y }) => {
+      const { at, ...before } = last;
+      last = { x, y, at: released };
+      return released - at < kDoubleClickMs && Math.hypot(x - before.x, y - before.y) < kDoubleClickPixels;
+    };
     const click = (position) => {
       const ground = this.pick(position);
       if (this.onClick) return this.onClick(ground);
@@ -308,14 +340,18 @@ export class Globe {
       callback(ground);
     };
     steerByKeyboard(this.container, camera, {
-      clearance: () => this.clearance, onEnter: () => click(middle()), onKey: (key) => this.onKey?.(key) ?? false,
+      clearance: () => this.clearance, onSteer: steer, onEnter: () => click(middle()), onKey: (key) => this.onKey?.(key) ?? false,
     });
-    handler.setInputAction(({ position }) => click(position), ScreenSpaceEventType.LEFT_CLICK);
+    handler.setInputAction(({ position }) => isSecond(position) || click(position), ScreenSpaceEventType.LEFT_CLICK);
+  }
+
+  #pickWorld(windowPosition) {
+    const ray = this.scene.camera.getPickRay(windowPosition);
+    return ray && this.scene.globe.pick(ray, this.scene);
   }
 
   pick(windowPosition) {
-    const ray = this.scene.camera.getPickRay(windowPosition);
-    const point = ray && this.scene.globe.pick(ray, this.scene);
+    const point = this.#pickWorld(windowPosition);
     if (!point) return undefined;
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),

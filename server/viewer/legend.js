@@ -2,7 +2,7 @@
 import { heightTicks, kColourings } from "/viewer/colours.js";
 import { formatHeight } from "/viewer/numbers.js";
 
-const kNames = { height: "Colours by height", slope: "Colours by slope, degrees", aspect: "Colours by the direction that the ground faces" };
+const kNames = { height: "Colours by height above the ellipsoid", slope: "Colours by slope, degrees", aspect: "Colours by the direction that the ground faces" };
 const kShareOfLetter = 0.028;  // of the width of the strip
 
 // `colouring`: a key of kColourings. `heights`: {min, max} of the dataset.
@@ -10,6 +10,7 @@ export function drawLegend(figure, colouring, heights) {
   kColourings[colouring].draw(figure.querySelector("canvas"), heights);
   const ticks = kColourings[colouring].ticks ?? ticksOfHeights(heights);
   figure.setAttribute("aria-label", kNames[colouring]);
+  figure.title = kNames[colouring];
   figure.querySelector("figcaption").replaceChildren(...ticks.map(([at, text]) => {
     const tick = Object.assign(document.createElement("span"), { textContent: text });
     tick.style.left = `${100 * at}%`;

@@ -1,9 +1,16 @@
 // Markers, lines and labels above the globe, as SVG: sharp, styled by the page, and drawn over everything. Ground is
 // {longitude, latitude, height}: degrees, metres above the ellipsoid without exaggeration. Ground whose height is undefined
 // is not drawn.
-import { Cartesian2, Cartesian3, EllipsoidalOccluder, SceneTransforms } from "/viewer/cesium/index.js";
+import { Cartesian2, Cartesian3, Ellipsoid, EllipsoidalOccluder, SceneTransforms } from "/viewer/cesium/index.js";
 
 const kSvg = "http://www.w3.org/2000/svg";
+
+const kSlack = 3200;  // metres by which the horizon is lower than the ellipsoid: what lies on ground there is not hidden too early
+
+// An ellipsoid whose radii are `metres` longer.
+export function raised({ radii: { x, y, z } }, metres) {
+  return new Ellipsoid(x + metres, y + metres, z + metres);
+}
 
 export function svg(tag, attributes = {}, parent = undefined) {
   const element = document.createElementNS(kSvg, tag);
@@ -23,7 +30,7 @@ export class Overlay {
     this.labelLayer = svg("g", { class: "contour-labels" }, this.root);
     this.lineLayer = svg("g", {}, this.root);
     this.markerLayer = svg("g", {}, this.root);
-    this.occluder = new EllipsoidalOccluder(scene.ellipsoid, scene.camera.positionWC);
+    this.lowest = 0;  // metres above the ellipsoid of the deepest ground: nothing below it hides it
     scene.postRender.addEventListener(() => this.#draw());
   }
 
@@ -65,13 +72,15 @@ export class Overlay {
   #place(ground) {
     if (ground.height === undefined) return undefined;
     const world = this.#worldOf(ground);
-    if (!this.occluder.isPointVisible(Cartesian3.multiplyByScalar(world, 1.0005, new Cartesian3()))) return undefined;
+    if (!this.occluder.isPointVisible(world)) return undefined;
     return SceneTransforms.worldToWindowCoordinates(this.scene, world, new Cartesian2());
   }
 
   #draw() {
     if (this.#markers.size + this.#labels.length === 0 && [...this.#lines.values()].every((line) => line.length === 0)) return;
-    this.occluder.cameraPosition = this.scene.camera.positionWC;
+    const { camera, ellipsoid, verticalExaggeration } = this.scene;
+    const horizon = raised(ellipsoid, Math.min(0, this.lowest * verticalExaggeration) - kSlack);
+    this.occluder = new EllipsoidalOccluder(horizon, camera.positionWC);
     for (const { ground, element } of this.#markers.values()) {
       const at = this.#place(ground);
       element.toggleAttribute("hidden", !at);

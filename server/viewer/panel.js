@@ -160,6 +160,12 @@ export class Panel {
     byId("readout").textContent = position ? formatPosition(position) + data : "";
   }
 
+  // No later message takes its place.
+  setLastMessage(text) {
+    this.setMessage(text);
+    this.setMessage = () => {};
+  }
+
   setMessage(text) {
     byId("message").hidden = !text;
     byId("message").textContent = text ?? "";

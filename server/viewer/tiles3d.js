@@ -22,7 +22,11 @@ void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
   vec3 offset = fromCamera / kRadii;
   float f = cameraLevel + dot(offset, 2.0 * camera + offset);
   float height = f / (sqrt(1.0 + f) + 1.0) * sqrt(1.0 + f) / length((camera + offset) / kRadii);
-  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true,
+  // CesiumJS exaggerates the normals of terrain, but not those of models.
+  vec3 up = czm_viewRotation * normalize((camera + offset) / kRadii);
+  vec3 normal = normalize(fsInput.attributes.normalEC);
+  normal = normalize(mix(dot(normal, up) * up, normal, exaggeration));
+  vec3 colour = terrainColour(height / exaggeration, -positionEC, normal, true,
                               draped > 0.5 ? czm_linearToSrgb(material.diffuse) : vec3(-1.0));
   material.diffuse = czm_srgbToLinear(colour);
 }`;
@@ -72,14 +76,13 @@ export class Tiles3d {
     const isLatest = this.#shows.begin();
     this.pending = true;
     try {
-      const shader = makeShader();
       const tileset = await Cesium3DTileset.fromUrl(resource, {
-        customShader: shader, splitDirection: SplitDirection.RIGHT, enableDebugWireframe: true, shadows: 0,
+        splitDirection: SplitDirection.RIGHT, enableDebugWireframe: true, shadows: 0,
       });
       if (!isLatest()) return tileset.destroy();
       this.#remove();
       tileset.tileFailed.addEventListener(({ message, url: tile }) => onError(`${tile} failed: ${message}`));
-      this.shader = shader;
+      tileset.customShader = this.shader = makeShader();
       this.tileset = this.scene.primitives.add(tileset);
       this.copied = {};
       this.#follow();
@@ -95,7 +98,10 @@ export class Tiles3d {
   }
 
   #remove() {
-    if (this.tileset) this.scene.primitives.remove(this.tileset);  // which destroys it
+    if (this.tileset) {
+      this.scene.primitives.remove(this.tileset);  // which destroys it, but not its shader
+      this.shader.destroy();
+    }
     this.tileset = undefined;
     this.scene.requestRender();
   }

@@ -2,13 +2,16 @@
 const byId = (id) => document.getElementById(id);
 
 export class TokenCard {
-  // `use`: called with the token.
-  constructor(use) {
+  // `use(token)`; `decline()`: called without one.
+  constructor(use, decline) {
     byId("token-card").addEventListener("submit", (event) => {
       event.preventDefault();
       use(byId("token").value.trim());
     });
-    byId("token-cancel").addEventListener("click", () => this.close());
+    byId("token-cancel").addEventListener("click", () => {
+      this.close();
+      decline();
+    });
   }
 
   // `reason`: a sentence. `isOptional`: there are datasets that need no token.

@@ -21,7 +21,7 @@ export function encodeView({ dataset, fraction, exaggeration, camera, split, rig
 
 const within = (value, [low, high]) => Math.min(high, Math.max(low, value));
 // A camera below all ground or far beyond the Earth would show nothing.
-const kCameraRanges = [[-360, 360], [-90, 90], [-12000, 1e8], [-360, 360], [-90, 90]];
+const cameraRanges = (exaggeration) => [[-360, 360], [-90, 90], [-12000 * exaggeration, 1e8], [-360, 360], [-90, 90]];
 
 // Leaves out values that are missing or invalid, and a camera that would see nothing. Takes errors and exaggeration to the
 // nearest ends of their sliders.
@@ -40,7 +40,8 @@ export function decodeView(fragment) {
   if (/^\d{4}-\d\d-\d\dT\d\d:\d\d$/.test(sun) && !Number.isNaN(time.getTime()) && time.toISOString().startsWith(sun)) view.sun = sun;
   const split = Number(query.get("split") ?? 0.5);
   view.split = split >= 0 && split <= 1 ? split : 0.5;
-  if (camera?.length === 5 && camera.every((value, i) => value === within(value, kCameraRanges[i]))) view.camera = camera;
+  const ranges = cameraRanges(view.exaggeration ?? 1);
+  if (camera?.length === 5 && camera.every((value, i) => value === within(value, ranges[i]))) view.camera = camera;
   for (const name of kSwitches) view[name] = query.has(name);
   return view;
 }

@@ -213,7 +213,7 @@ describe('features of the viewer', () => {
     await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, kWait);
     const state = () => page.evaluate(() => [terrace.state.colouring, terrace.state.sun, terrace.state.right]);
     const before = await state();
-    assert.match(page.url(), /colours=slope&sun=\d{4}-06-21T18:30&right=4/);
+    await page.waitForURL(/colours=slope&sun=\d{4}-06-21T18:30&right=4/);
     await assertAccessible(page, 'all settings, two errors');
     await page.reload();
     await settled();
@@ -304,16 +304,28 @@ describe('features of the viewer', () => {
     const plain = await launchWithoutWebGl();
     test.after(() => plain.close());
     const flat = await plain.newPage({ viewport: { width: 700, height: 450 } });
+    // The page believes in WebGL 2 until CesiumJS needs it; and the first list of datasets fails.
+    await flat.addInitScript(() => {
+      const { getContext } = HTMLCanvasElement.prototype;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind === 'webgl2' && !this.isConnected ? {} : getContext.call(this, kind, ...rest);
+      };
+    });
+    await flat.route('**/datasets', (route) => route.fulfill({ status: 503, body: '' }), { times: 1 });
     await flat.goto(`${server.url}/`);
     await flat.getByText('no WebGL 2').waitFor({ timeout: 30000 });
     await flat.waitForFunction(() => {
       const canvas = document.querySelector('#globe canvas');
+      if (!canvas?.width) return false;
       const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
       return new Set(new Uint32Array(data.buffer)).size > 500;
     }, undefined, kWait);
     await flat.locator('#globe').focus();
     await flat.keyboard.press('Enter');
     await flat.waitForFunction(() => / m$/.test(document.getElementById('readout').textContent), undefined, kWait);
+    await flat.route('**/heights*', (route) => route.fulfill({ status: 503, body: '' }), { times: 1 });
+    await flat.keyboard.press('Enter');
+    await flat.getByText('The height could not be read').waitFor({ timeout: 30000 });
     await assertAccessible(flat, 'the flat map');
     await flat.route('**/datasets', async (route) => {
       const list = await (await route.fetch()).json();

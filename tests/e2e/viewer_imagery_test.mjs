@@ -63,11 +63,19 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     assert.ok(await shareOfMagenta(page) > 0.3, `${await shareOfMagenta(page)}`);
     assert.ok(asked.some((url) => /^\/hills\/imagery\/geodetic\/\d+\/\d+\/\d+\.webp$/.test(url)), asked.join(' '));
     await assertAccessible(page, 'layers');
+    const boxes = await page.evaluate(async () => {
+      const { addImagery } = await import('/viewer/imagery.js');
+      const layers = [];
+      const scene = { imageryLayers: { addImageryProvider: (layer) => layers.push(layer) } };
+      addImagery(scene, '/x/{z}/{x}/{y}.webp', { bounds: [179, -17, -179, -16], geodetic_max_level: 3 }, {}, () => {});
+      return layers.map(({ rectangle: { west, east } }) => [west, east].map((angle) => Math.round((angle * 180) / Math.PI)));
+    });
+    assert.deepEqual(boxes, [[179, 180], [-180, -179]], 'both sides of 180 degrees');
     await page.locator('#imagery').uncheck();
     await settled();
     for (let i = 0; i < 60 && await shareOfMagenta(page) > 0; ++i) await page.waitForTimeout(500);
     assert.equal(await shareOfMagenta(page), 0);
-    assert.ok(!/imagery/.test(page.url()));
+    await page.waitForURL((url) => !/imagery/.test(url.hash));
     await page.close();
   });
 

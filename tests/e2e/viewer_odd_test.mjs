@@ -6,7 +6,7 @@ import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { end, hold, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { run, samples, serve } from './harness.mjs';
-import { discOf, isGlobal } from '../../server/viewer/framing.js';
+import { boxOf, discOf, isGlobal } from '../../server/viewer/framing.js';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
 
 const kWait = { timeout: 90000, polling: 200 };
@@ -41,6 +41,10 @@ describe('a first view', () => {
   it('has a pole in the middle of what goes around it', () => {
     assert.deepEqual(discOf(frame(-180, -90, 180, -89)), { longitude: 0, latitude: -90, diameter: 2 * 111320 });
     assert.equal(discOf(frame(5, 45, 15, 48)).latitude, 46.5);
+  });
+
+  it('has its middle within 180 degrees, beyond which the server has no heights', () => {
+    assert.deepEqual([[179, 0, -178, 1], [178, 0, -179, 1], [-180, 0, 180, 1]].map((bounds) => boxOf(bounds).longitude), [-179.5, 179.5, 0]);
   });
 });
 
@@ -99,6 +103,28 @@ describe('the viewer', () => {
       assert.ok(Math.hypot(longitude - 10, latitude - 45) < 0.1);
     });
   }
+
+  it('is steered, contoured and marked below the ellipsoid as above it', async () => {
+    await open('#dataset=deep&contours&camera=10.01,45.005,-8000,0,-40');
+    const { interval, before, after } = await page.evaluate(() => {
+      const { globe } = terrace;
+      globe.adaptToCamera();
+      const [, before] = globe.camera;
+      document.getElementById('globe').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowUp' }));
+      return { interval: globe.interval, before, after: globe.camera[1] };
+    });
+    assert.ok(interval < 100, `contours of ${interval} m on ground 1 km away`);
+    assert.ok(after > before && after < before + 0.01, `ahead from ${before} to ${after}`);
+    const isHidden = await page.evaluate(() => {
+      const { globe } = terrace;
+      globe.exaggeration = 10;
+      globe.camera = [-150, 20, 20000, 0, -90];
+      globe.overlay.setMarker('picked', { longitude: -150, latitude: 20, height: -5000 });
+      globe.scene.render();
+      return document.querySelector('.marker.picked').hasAttribute('hidden');
+    });
+    assert.equal(isHidden, false, 'a marker on the floor of a deep sea');
+  });
 
   it('shows a region around a pole from near', async () => {
     // The many narrow tiles there take a software renderer a minute, and the camera does not wait for them.
@@ -170,7 +196,7 @@ describe('the viewer', () => {
     const view = await page.evaluate(() => ({ fraction: terrace.state.fraction, right: terrace.state.right, sun: terrace.state.sun,
       exaggeration: terrace.globe.exaggeration, colouring: terrace.state.colouring, split: terrace.globe.split }));
     assert.deepEqual({ ...view, fraction: 0 }, { fraction: 0, right: undefined, sun: undefined, exaggeration: 10, colouring: 'height', split: 0.5 });
-    assert.match(page.url(), /camera=(9|10)\.\d+,4[45]\.\d+,/, 'the first dataset is in view');
+    await page.waitForURL(/camera=(9|10)\.\d+,4[45]\.\d+,/);  // the first dataset is in view
     const decoded = (hash) => page.evaluate(async (text) => (await import('/viewer/view_url.js')).decodeView(text), hash);
     for (const camera of ['a,b,c,d,e', '1,2,3', '', 'NaN,0,0,0,0', '1,2,3,4,5,6', '8,46,1e9,0,0', '8,46,-1e5,0,0', '8,91,5000,0,0', ',,,,', '8,46,,0,0']) {
       assert.equal((await decoded(`#dataset=x&camera=${camera}`)).camera, undefined, camera);
@@ -178,6 +204,7 @@ describe('the viewer', () => {
     const suns = ['2026-02-31T10:00', '2026-06-21T24:00', '12026-06-21T10:00', '1970-01-01T00:00', '2026-02-28T23:59'];
     for (const [i, sun] of suns.entries()) assert.equal((await decoded(`#sun=${sun}`)).sun, i > 2 ? sun : undefined, sun);
     const { camera, fraction, right } = await decoded('#dataset=x&camera=-179.5,-80,-4000,359.9,12.5&fraction=1e-300&right=1e300');
+    assert.ok((await decoded('#dataset=x&exaggeration=5&camera=142,11,-45000,10,-28')).camera, 'above exaggerated ground');
     assert.deepEqual({ camera, fraction, right }, { camera: [-179.5, -80, -4000, 359.9, 12.5], fraction: 1 / 32, right: 4 });
     assert.deepEqual(page.wrongs, []);
   });
@@ -223,8 +250,9 @@ describe('the viewer', () => {
         canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0);
     }, name, kWait);
     const pick = (name) => flat.locator('#dataset').selectOption(name);
-    await flat.goto(`${server.url}/#dataset=level`);
+    await flat.goto(`${server.url}/#dataset=level&camera=10,45,9000,0,-30&contours`);
     await drawn('level');
+    assert.match(flat.url(), /#dataset=level&camera=10,45,9000,0,-30&contours$/, 'the view of the address, for the globe');
 
     let small = await hold(flat, /\/small\/tiles\.json/);
     await flat.evaluate(() => (location.hash = 'dataset=small'));
@@ -259,6 +287,9 @@ describe('the viewer', () => {
     await refused;
     await flat.unroute(isTile);
     await drawn('deep');
+
+    await pick('cap');
+    await flat.getByText('cap is beyond 85 degrees').waitFor();
   });
 
   it('keeps the panel, the tools and its messages apart', async () => {

@@ -142,11 +142,43 @@ describe('the viewer', () => {
     await page.locator('#splitter').focus();
     await page.keyboard.press('ArrowLeft');
     assert.equal(await page.evaluate(() => terrace.globe.split), 0.48);
-    assert.match(page.url(), /&tiles3d&split=0\.48/);
+    await page.waitForURL(/&tiles3d&split=0\.48/);
+
+    // Slopes without exaggeration, on both sides; and a browser that has had enough changes of the address.
+    const tried = await page.evaluate(() => {
+      window.tried = 0;
+      window.shader = terrace.globe.tiles3d.shader;
+      history.replaceState = () => {
+        window.tried += 1;
+        throw new DOMException('Attempt to use history.replaceState() more than 100 times per 30 seconds', 'SecurityError');
+      };
+      const press = (key) => document.getElementById('splitter').dispatchEvent(new KeyboardEvent('keydown', { key }));
+      for (let i = 0; i < 75; ++i) ['ArrowLeft', 'ArrowRight'].forEach(press);
+      window.cameraBefore = terrace.globe.camera;
+      terrace.globe.colouring = 'slope';
+      terrace.globe.exaggeration = 10;
+      terrace.globe.camera = [terrace.state.dataset.bounds[0] + 0.2, terrace.state.dataset.bounds[1] + 0.2, 30000, 0, -90];
+      return window.tried;
+    });
+    assert.ok(tried < 5, `${tried} changes of the address at once`);
+    await settle(page);
+    const sloped = await picture(page);
     await page.locator('#tiles3d').uncheck();
     await settle(page);
+    const steep = await picture(page);
+    const other = sloped.filter((colour, i) => hue(colour).some((channel, k) => Math.abs(channel - hue(steep[i])[k]) > 6));
+    assert.ok(other.length / steep.length < 0.1, `${other.length} of ${steep.length} pixels have another slope`);
+    assert.ok(await page.evaluate(() => window.tried > 0 && terrace.globe.widget.useDefaultRenderLoop), 'it is still drawn');
+    assert.ok(await page.evaluate(() => window.shader.isDestroyed()), 'with its textures');
     assert.ok(await page.locator('#splitter').isHidden());
     assert.equal(await page.evaluate(() => terrace.globe.tiles3d.drawn().tiles), 0);
+    await page.evaluate(() => {
+      delete history.replaceState;
+      terrace.globe.colouring = 'height';
+      terrace.globe.exaggeration = 1;
+      terrace.globe.camera = window.cameraBefore;
+    });
+    await settle(page);
   });
 
   it('tells position and height of a click', async () => {
@@ -179,6 +211,7 @@ describe('the viewer', () => {
       return [terrace.state.dataset.name, Number(terrace.state.fraction.toPrecision(6)), terrace.state.contours, ...place];
     });
     const before = await state();
+    await page.waitForURL(/&contours/);
     await page.reload();
     await settle(page);
     assert.deepEqual(await state(), before);
@@ -220,12 +253,19 @@ describe('the viewer', () => {
     const lost = await openPage(browser, `${url}/#dataset=nowhere`);
     await lost.locator('#message').waitFor({ timeout: kSettleMs });
     assert.match(await lost.locator('#message').innerText(), /no dataset nowhere on this server; this is /);
-    assert.match(lost.url(), /#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/, 'the address has what is shown');
+    await lost.waitForURL(/#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/);  // what is shown
     await lost.close();
   });
 
   it('says in the page what failed', async () => {
     const broken = await browser.newPage();
+    const says = (text) => broken.locator('#message').getByText(text).waitFor({ timeout: kSettleMs });
+    for (const [file, status, text] of [['cesium/index.js', 404, 'it was built without CesiumJS'], ['early.js', 503, 'the server did not answer for all']]) {
+      await broken.route(`**/viewer/${file}`, (route) => route.fulfill({ status, body: '' }));
+      await broken.goto(url);
+      await says(text);
+      await broken.unroute(`**/viewer/${file}`);
+    }
     await broken.route('**/datasets', (route) => route.fulfill({ status: 503, body: '' }));
     await broken.goto(url);
     await broken.locator('#message').waitFor();
@@ -240,6 +280,22 @@ describe('the viewer', () => {
     await broken.route('**/*.terrain*', (route) => route.fulfill(problem));
     await broken.reload();
     await broken.getByText(/^Tiles of \w+ cannot be read: the source is being replaced\. The page tries again\.$/).waitFor({ timeout: kSettleMs });
+
+    await broken.route('**/datasets', (route) => route.fulfill({ status: 429, body: '' }));
+    await says('The server answers 429.');
+    const scale = await broken.evaluate(() => {
+      window.devicePixelRatio = 4;  // on another screen
+      dispatchEvent(new Event('resize'));
+      terrace.globe.scene.canvas.getContext('webgl2').getExtension('WEBGL_lose_context').loseContext();
+      return terrace.globe.widget.resolutionScale;
+    });
+    assert.equal(scale, 0.5, 'at most two pixels to the side');
+    await says('The browser has dropped the picture. Reload the page.');
+    await broken.unroute('**/datasets');
+    await broken.evaluate(() => document.dispatchEvent(new Event('visibilitychange')));
+    await broken.waitForResponse(/\/datasets$/);
+    await broken.waitForTimeout(300);
+    await says('The browser has dropped the picture. Reload the page.');
     await broken.close();
   });
 });
@@ -288,9 +344,15 @@ describe('a region of fine data on a globe', { skip: process.env.TERRACE_URL ? '
     assert.deepEqual(page.wrongs, []);
   });
 
-  it('is found also if the list of datasets is read meanwhile', async () => {
+  it('is found also if the list of datasets is read meanwhile, but not if the user steers', async () => {
     await page.locator('#whole').click();
-    await page.waitForFunction(() => terrace.globe.camera[2] > 1e7, undefined, { timeout: kSettleMs });
+    await page.waitForFunction(() => terrace.globe.camera[2] > 1e7 && terrace.globe.scene.tweens.length === 0, undefined, { timeout: kSettleMs });
+    const heights = await hold(page, /\/mosaic\/heights/);
+    await page.locator('#home').click();
+    await heights.asked;
+    await page.locator('#globe').press('ArrowLeft');
+    await heights.release();
+    assert.equal(await page.evaluate(() => terrace.globe.scene.tweens.length), 0, 'no flight');
     const listed = page.waitForResponse(/\/datasets$/, { timeout: kSettleMs });
     let isHeld = false;
     await page.route(/\/mosaic\/heights/, async (route) => {
@@ -367,8 +429,14 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     assert.deepEqual(unauthorized, []);
     assert.ok(!page.requested.some((url) => url.includes(token)), 'no URL holds the token');
 
-    await page.route('**/datasets', (route) => route.fulfill({ status: 401, json: {} }));  // after a start with other tokens
+    // After a start with other tokens.
+    await page.route('**/datasets', (route) => (route.request().headers().authorization ? route.fulfill({ status: 401, json: {} }) : route.continue()));
     await page.getByText('The server does not know the token of this page any more.').waitFor({ timeout: kSettleMs });
+    await page.locator('#token-cancel').click();
+    await page.waitForFunction(() => terrace.state.datasets.map(({ name }) => name).join() === 'earth' && terrace.state.dataset.name === 'earth',
+      undefined, { timeout: kSettleMs });
+    await page.getByText('hills needs a token').waitFor({ timeout: kSettleMs });
+    assert.equal(await page.evaluate(async () => (await import('/viewer/early.js')).access.token), '');
     await page.unroute('**/datasets');
     await page.locator('#token').fill(token);
     await page.keyboard.press('Enter');
