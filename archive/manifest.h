@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/common/dem_types.h"
+#include "engine/core/names.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/tile/tile_request.h"

@@ -12,8 +12,11 @@
 #include <utility>
 
 #include "archive/unit_name.h"
+#include "engine/core/names.h"
 #include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
+#include "proto/documents/picture_names.h"
+#include "proto/gltf/gltf_names.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::archive {

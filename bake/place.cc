@@ -18,6 +18,7 @@
 #include "archive/unit_name.h"
 #include "bake/place_files.h"
 #include "engine/core/errno_text.h"
+#include "engine/core/names.h"
 #include "engine/core/parse_number.h"
 #include "tiler/encoder_version.h"
 

@@ -27,7 +27,7 @@ struct WaterOptions {
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };
 
-// The image that textures of GLB tiles and image tiles for maps show. `texture` and `side` are for GLB tiles alone.
+// The image shown by textures of GLB tiles and by image tiles for maps. `texture` and `side` are for GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
   // The default for TileRequest::texture: bakes use it, and the server if a client names no texture. TilePipeline reads
@@ -55,8 +55,9 @@ struct Dataset {
   // copyright, the texture, `draco.uv` and both errors itself.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
-  std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none
-  std::vector<WatchedFile> baked_files;              // a change of one of them means that there is another archive
+  // An archive of tiles of this dataset, with the same generation if there are sources; null: none.
+  std::shared_ptr<const BakedTiles> baked;
+  std::vector<WatchedFile> baked_files;  // a change of one of them means that there is another archive
   WaterOptions water;
   ImageryOptions imagery;
   // N: the quantized-mesh tiles of levels 0, N, 2N, ... have the metadata extension, which lists the tiles below them.
@@ -67,9 +68,9 @@ struct Dataset {
   // counted from 1, in its datasets(). Other pipelines use the same numbers, so such a dataset must not share a
   // RefinementCache, TileTiers or TileStore with another pipeline, neither at the same time nor later.
   std::uint64_t generation = 0;
-  // GenerationOf(dataset, model->unedited_fingerprint()); 0: there are no edits. Caches are keyed by cache_generation()
-  // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,
-  // dem::TileEdits::Hash for refinements.
+  // GenerationOf(dataset, model->unedited_fingerprint()); 0: there are no edits. Keys of cached tiles and refinements
+  // contain cache_generation() and a hash of the edits that the tile depends on, so that other tiles stay valid when an
+  // edit changes. This hash is TileEditsHash for tiles and dem::TileEdits::Hash for refinements.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`

@@ -11,6 +11,8 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/mesh/position_width.h"
 #include "tiler/encoders.h"
 #include "tiler/mesh/error_allowed_at_samples.h"
 #include "tiler/mesh/refine_options.h"

@@ -28,10 +28,11 @@ class RefinementCache;
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
 // that compute results are virtual, so that tests can replace them.
 //
-// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. Another format,
-// coding or larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion.
-// Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of ReadDrawnPoints and
-// LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
+// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. A refinement is the
+// record of a run of insertions. If a kept tile is requested in another format or coding, or with a larger error, its
+// refinement is replayed without new insertions, and the tile is encoded. If it is requested with a smaller error, the
+// insertion is continued. Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes
+// of ReadDrawnPoints and LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,

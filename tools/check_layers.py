@@ -44,8 +44,8 @@ PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
     ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/token_hash.h",
                           "common/working_directory.h", "options/options.h")),
 ) for name in names}
-# Plain values in the configuration's structs: config may include nothing else of these modules.
-VALUES = {"engine/common/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
+# Plain values in the configuration's structs, and their names: config may include nothing else of these modules.
+VALUES = {"engine/common/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_names.h", "proto/gltf/gltf_types.h"}
 # The client that flies: scene <- select; {select, content} <- tree; {tree, http} <- flight <- report <- cli/fly.
 FLY = ["fly/scene", "fly/select", "fly/content", "fly/tree", "fly/http", "fly/flight", "fly/report"]
 HTTP = ["server/net", "server/http"]

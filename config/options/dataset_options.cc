@@ -1,5 +1,6 @@
 // The table of options of one dataset.
 #include "config/options/option_table.h"
+#include "proto/gltf/gltf_names.h"
 
 namespace terrace::config {
 namespace {

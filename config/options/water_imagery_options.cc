@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "config/options/option_table.h"
+#include "proto/gltf/gltf_names.h"
 
 namespace terrace::config {
 namespace {

@@ -38,9 +38,9 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
-// convert these heights to the ellipsoid and back, which may change them by millimetres. They stay unchanged if all
-// sources that the edit touches have its datum; for kSource, the datum in which the floor is returned (see there) must
-// be the edit's too.
+// convert them to the ellipsoid and back, which may change them by millimetres. They are returned unchanged if the
+// heights of all sources that the edit touches are returned in the edit's datum. For kSource, the floor must be
+// returned in that datum too.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
@@ -176,13 +176,15 @@ struct DemInfo {
   double floor = 0;
   int max_level = 0;
   int max_source_level = 0;  // what max_level would be without edits, which may add levels
+  // The first depth, at least 1, whose Web Mercator grid (256 << depth pixels around the Earth) is as fine as the
+  // finest source.
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.
   std::vector<std::string> left_out;
 };
 
-// Blocks of samples with their voids filled that the process keeps for points and lines of sight, of all sources.
+// The blocks of samples that the process keeps for points and lines of sight, for all sources. Their voids are filled.
 struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };

@@ -14,7 +14,7 @@ namespace terrace {
 template <typename T, std::size_t kCount>
 using Names = std::array<std::pair<std::string_view, T>, kCount>;
 
-// Nothing: no value has this name.
+// Returns the value that has this name; nullopt if there is none.
 template <typename T, std::size_t kCount>
 std::optional<T> ValueNamed(const Names<T, kCount>& names, std::string_view name) {
   const auto* const found = std::ranges::find(names, name, [](const auto& known) { return known.first; });

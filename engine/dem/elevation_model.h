@@ -39,8 +39,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
-  // of a file are missing. If some files have other errors: without DemOptions::fault, the first of these errors is
-  // returned; with it, it is called with each of them, and kCancelled is returned.
+  // of a file are missing. If other files have other errors as well: without DemOptions::fault, the first of these
+  // errors is returned instead; with it, DemOptions::fault is called with each of them, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -87,7 +87,8 @@ class ElevationModel {
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. Preconditions:
-  // as above; `datum` is kEllipsoid, or kSource for what a map calls elevation. Errors: those of Read.
+  // as above; `datum` is kEllipsoid or kSource. Maps that print heights, such as contours, use kSource. Errors: those
+  // of Read.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 
@@ -103,9 +104,9 @@ class ElevationModel {
 
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a ray passes over the box around an edit that
-  // changes heights or cuts a hole, or closely beside it. Boxes more than 125 m to the side of the ray, measured on the
-  // map, never count.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit changes heights or cuts a hole, and the
+  // box around it lies below a ray or near it. A box at a horizontal distance of more than 125 m from the ray never
+  // causes this error.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

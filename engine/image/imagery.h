@@ -23,7 +23,7 @@ struct TilePicture {
   std::vector<std::uint8_t> rgb;  // 3 * side * side
 };
 
-// The same with alpha: 0, with black, where the image has no colour; else 255.
+// The same with alpha: 255 where the image has a colour. Elsewhere the pixel is black and alpha is 0.
 struct MapPicture {
   int side = 0;
   std::vector<std::uint8_t> rgba;  // 4 * side * side
@@ -44,9 +44,10 @@ class Imagery {
 
   // Opens an image in 8 or 16 bits per band, with a georeference: grey with or without alpha, a palette, bands that
   // state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path` is
-  // resolved at each use. kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be
-  // opened, no georeference, bands that are not colours, or an image outside `around`. kChanged: a file was replaced
-  // meanwhile. kUnavailable: it cannot be read. kCancelled: stopped.
+  // resolved at each use. `content`: where hashes of large files are stored, and the token that stops Open. kNotFound:
+  // there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference, bands that
+  // are not colours, or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it cannot be
+  // read. kCancelled: stopped.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();
@@ -71,7 +72,7 @@ class Imagery {
                                   std::stop_token stop = {}) const;
   Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
-  static constexpr int kMapSide = 256;
+  static constexpr int kMapSide = 256;  // the side that ImageExtent::max_geodetic_level is stated for
   ImageExtent extent() const;
 
   // A hash of the bytes of its files and of their georeference. Copies have the same hash.

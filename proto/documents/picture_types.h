@@ -3,8 +3,6 @@
 
 #include <cstdint>
 
-#include "engine/core/names.h"
-
 namespace terrace::proto {
 
 // Heights as colours (height_png.h).
@@ -12,9 +10,6 @@ enum class HeightEncoding : std::uint8_t {
   kMapbox,    // -10000 + (R * 65536 + G * 256 + B) * 0.1 metres
   kTerrarium  // R * 256 + G + B / 256 - 32768 metres
 };
-
-inline constexpr Names<HeightEncoding, 2> kHeightEncodingNames = {
-    {{"mapbox", HeightEncoding::kMapbox}, {"terrarium", HeightEncoding::kTerrarium}}};
 
 // The file format of a picture of a map tile.
 enum class PictureFormat : std::uint8_t { kPng, kWebp, kJpeg };

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/names.h"
 #include "engine/geo/mercator_grid.h"
+#include "proto/documents/picture_names.h"
 #include "proto/documents/vector_tile.h"
 
 namespace terrace::proto {

@@ -12,7 +12,7 @@ namespace terrace::proto {
 struct DracoOptions {
   int speed = 7;        // 0 smallest .. 10 fastest; 10 is sequential coding, below it edgebreaker
   int normal_bits = 8;  // 2 .. 16, of each of the two coordinates of an oct-encoded normal
-  bool uv = false;  // texture coordinates as well, to a 4095th of the picture's edge; set by the encoder of GLB tiles
+  bool uv = false;      // also encodes texture coordinates, 12 bits each; the encoder of GLB tiles sets it
 };
 
 // A picture of the tile as an image file. The image's edges are the tile's edges.

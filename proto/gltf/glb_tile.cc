@@ -10,6 +10,7 @@
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
 #include "proto/format_error_up.h"
+#include "proto/gltf/draco_mesh.h"
 #include "proto/gltf/gltf.h"
 #include "proto/gltf/meshopt.h"
 

@@ -7,8 +7,16 @@
 #include "engine/core/result.h"
 #include "proto/gltf/glb_options.h"
 #include "proto/mesh/grid_mesh.h"
+#include "proto/mesh/position_width.h"
 
 namespace terrace::proto {
+
+// Which of the two grids positions are rounded to: the one for 16 bits, or the finer one for floats. The file may store
+// another number type.
+constexpr PositionWidth WidthOf(GlbCompression compression) {
+  const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
+  return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
+}
 
 struct GlbTile {
   std::string bytes;

@@ -3,12 +3,9 @@
 
 #include <cstdint>
 
-#include "engine/core/names.h"
-#include "proto/mesh/position_width.h"
-
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. Positions are rounded to a grid that depends on level, error and WidthOf, and
+// How the mesh of a GLB tile is stored. Positions are rounded to a grid, whose step depends on level and error, and
 // stored as integers or as floats. kDraco and kNone have one grid and decode to the same positions, bit for bit; so do
 // kQuantized and kMeshopt, whose grid may be coarser.
 enum class GlbCompression : std::uint8_t {
@@ -19,27 +16,12 @@ enum class GlbCompression : std::uint8_t {
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
 
-inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", GlbCompression::kDraco},
-                                                                   {"none", GlbCompression::kNone},
-                                                                   {"quantized", GlbCompression::kQuantized},
-                                                                   {"meshopt", GlbCompression::kMeshopt}}};
-
-// The number type that the grid of positions is chosen for: the grid for floats is finer. It need not be the type that
-// the file stores.
-constexpr PositionWidth WidthOf(GlbCompression compression) {
-  const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
-  return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
-}
-
 // How the texture of a GLB tile is stored.
 enum class TextureFormat : std::uint8_t {
   kNone,  // no texture
   kJpeg,  // baseline, which every glTF client reads
   kWebp,  // lossy; smaller at the same quality number, for readers of EXT_texture_webp
 };
-
-inline constexpr Names<TextureFormat, 3> kTextureFormatNames = {
-    {{"jpeg", TextureFormat::kJpeg}, {"webp", TextureFormat::kWebp}, {"none", TextureFormat::kNone}}};
 
 // Wavefront OBJ, PLY and binary glTF (mesh_file.h).
 enum class MeshFileFormat : std::uint8_t { kObj, kPly, kGlb };

@@ -1,4 +1,4 @@
-// The number type of a GLB tile's positions.
+// The number type that the grid of a GLB tile's positions is chosen for; see WidthOf (proto/gltf/glb_tile.h).
 #pragma once
 
 #include <cstdint>

@@ -2,7 +2,9 @@
 
 #include <utility>
 
+#include "engine/core/names.h"
 #include "proto/documents/map_picture.h"
+#include "proto/documents/picture_names.h"
 #include "proto/documents/tile_json.h"
 #include "server/api/caching.h"
 #include "server/api/map_formats.h"

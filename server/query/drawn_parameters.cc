@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "engine/geo/tile_key.h"
+#include "proto/gltf/gltf_names.h"
 #include "server/http/text.h"
 
 namespace terrace::server {

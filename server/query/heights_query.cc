@@ -9,6 +9,7 @@
 #include "engine/core/plain_number.h"
 #include "engine/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
+#include "server/http/text.h"
 #include "server/query/drawn_parameters.h"
 #include "server/query/heights_parameters.h"
 #include "server/query/parameters.h"

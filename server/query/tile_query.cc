@@ -3,6 +3,9 @@
 #include <array>
 #include <cstddef>
 
+#include "engine/core/names.h"
+#include "proto/documents/picture_names.h"
+#include "proto/gltf/gltf_names.h"
 #include "server/http/text.h"
 
 namespace terrace::server {

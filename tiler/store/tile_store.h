@@ -2,8 +2,9 @@
 // TileTiers. The server passes those in ServerOptions::tile_stores (server/server.h). A tier for refinements implements
 // RefinementStore (refinement_cache.h).
 //
-// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert may block only in a
-// tier that was made to wait for room in its queue instead of dropping values. The others return at once.
+// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert drops values if its
+// queue is full; only a tier that is configured to wait for room instead may block in Insert. The other functions
+// return at once.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +23,10 @@ namespace terrace::tiler {
 // A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
-  TileRequest request;           // its `dataset` is 0
-  std::uint64_t generation = 0;  // Dataset::cache_generation() in TilePipeline::datasets(), where no generation is 0
+  TileRequest request;  // its `dataset` is 0
+  // Dataset::cache_generation() of the dataset in TilePipeline::datasets(): the pipeline has replaced a generation that
+  // was 0.
+  std::uint64_t generation = 0;
   // TileEditsHash (tiler/dataset.h): only of edits that the tile depends on, so that a change of an edit leaves other
   // tiles valid. 0 for a dataset that has only baked tiles.
   std::uint64_t edits = 0;

@@ -16,7 +16,7 @@ struct DrawnSurface {
   // error_m is not set.
   std::optional<int> level;
   RequestedError requested = {};
-  TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb, of datasets with sources
+  TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb, only if the dataset has sources
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
 };
 

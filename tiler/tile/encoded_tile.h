@@ -36,8 +36,9 @@ struct HeaderLines {
 struct EncodedTile {
   std::string bytes;  // the body in its content coding
   std::string etag;   // strong, with the quotes
-  // The Terrain-Max-Error header: of tiles with a mesh, measured on the encoded integers; of height PNGs, the rounding
-  // of heights to colours; of area meshes, measured before encoding.
+  // The Terrain-Max-Error header, metres: the largest vertical distance between the tile's samples and the mesh that
+  // clients decode, measured on the encoded integers. Of height PNGs: the largest rounding of a height to a colour. Of
+  // area meshes: as BuildAreaMesh says. Of other formats: 0.
   double max_error_m = 0;
   // The Terrain-Certified-Error header, metres: an upper bound of the distance to every sample of the sources, each
   // after the edits that apply to that sample. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.

@@ -14,6 +14,7 @@
 #include "config/common/working_directory.h"
 #include "config/file/parse.h"
 #include "config/options/options.h"
+#include "engine/core/names.h"
 #include "engine/geo/tile_key.h"
 #include "proto/media_type.h"
 #include "server/cli/common/source_files.h"
