@@ -83,8 +83,8 @@ int RunFly(const FlyArguments& arguments) {
   std::signal(SIGTERM, RequestStop);
   fly::Statistics statistics(options->clients);
   std::FILE* const log = arguments.json ? stderr : stdout;
-  fmt::print(log, "{}: {:.1f} km in {:.0f} s, {} client{}\n", options->document.PublicText(), options->path.length_m() / 1000,
-             options->duration_s, options->clients, options->clients == 1 ? "" : "s");
+  fmt::print(log, "{}: {:.1f} km in {:.0f} s, {} client{}\n", options->document.PublicText(),
+             options->path.length_m() / 1000, options->duration_s, options->clients, options->clients == 1 ? "" : "s");
   fly::Fly(
       *options, stop_requested,
       [&](std::size_t i) {

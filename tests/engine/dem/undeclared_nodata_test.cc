@@ -163,17 +163,14 @@ TEST(UndeclaredNodata, ACollarOfZerosIsVoid) {
   ExpectHeightsWithin(*source, 999, 1401);
 }
 
-// -613.9 / 0.1 is not exactly -6139.
 TEST(UndeclaredNodata, ACollarOfIntegersWithAnOffsetIsVoid) {
   const TempDir dir;
   RasterSpec spec = Synthetic([](int col, int row) { return std::round((Framed(col, row) - 613.9) / 0.1); });
-  spec.type = "Int16";
-  spec.scale = 0.1, spec.offset = 613.9;
+  spec.type = "Int16", spec.scale = 0.1, spec.offset = 613.9;  // -613.9 / 0.1 is not exactly -6139
   spec.nodata = std::nullopt;
   const auto source = OpenOrFail(WriteRaster(dir, spec));
   ASSERT_NE(source, nullptr);
-  EXPECT_NE(InfoOf(*source).found_voids.find("collar"), std::string::npos) << InfoOf(*source).found_voids;
-  EXPECT_GE(InfoOf(*source).heights.min, 999);
+  EXPECT_GE(InfoOf(*source).heights.min, 999) << InfoOf(*source).found_voids;
 }
 
 TEST(UndeclaredNodata, ASeaIsNoCollar) {
