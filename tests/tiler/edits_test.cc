@@ -447,8 +447,7 @@ TEST_F(Edits, LeaveEdgesOfGlbTilesEqual) {
 TEST_F(Edits, CutHoles) {
   const TilePipeline plain = Open({}), pipeline = Open({Kinds().at("hole")});
   const auto middle = ModelOf(pipeline).ReadPoints(std::array{dem::GeoPosition{kLongitude, kLatitude}});
-  ASSERT_TRUE(middle.has_value());
-  EXPECT_TRUE(std::isnan(middle->front()));
+  EXPECT_TRUE(middle && std::isnan(middle->front()));
   for (const int step : kSteps) {
     const geo::TileKey key = TileAt(12);
     const FetchedTile tile = FetchTile(pipeline, RequestFor(key, step));
@@ -473,23 +472,22 @@ TEST_F(Edits, CutHoles) {
 
 // Ground may stand in a hole as far as a triangle of one cell at its outline, whatever the criterion.
 TEST_F(Edits, CutHolesAlongTheirOutline) {
-  constexpr double kReach = 0.06;  // of a diamond: all steps of its outline are diagonal
+  constexpr double kReach = 0.06, kSide = 180.0 / 2048;  // a diamond: all steps of its outline are diagonal
   const std::string diamond =
       Feature(R"({"op":"hole"})",
               fmt::format(R"({{"type":"Polygon","coordinates":[[{0},{1},{2},{3},{0}]]}})", Position(kReach, 0),
                           Position(0, kReach), Position(-kReach, 0), Position(0, -kReach)));
-  const double side = 180.0 / 2048;
   for (const bool compact : {false, true}) {
     const TilePipeline pipeline = Open({diamond}, {tin::Criterion::kDataDependent, compact});
-    const double cell = side / ModelOf(pipeline).LatticeOf(11).cells;
+    const double cell = kSide / ModelOf(pipeline).LatticeOf(11).cells;
     for (const auto& [dx, dy] : {std::pair{-1, -1}, {-1, 0}, {0, -1}, {0, 0}}) {
       const geo::TileKey key = TileAt(11, dx, dy);
       const FetchedTile tile = FetchTile(pipeline, RequestFor(key, geo::SnapToLadder(11, 2)));
       double deepest = -1000;  // cells along an axis
       for (const auto& triangle : tile.mesh.triangles) {
         for (std::size_t i = 0; i < 3 && triangle[0] != triangle[1]; ++i) {
-          const double east = (static_cast<double>(key.x) + tile.mesh.u[triangle[i]] / 32767.0) * side - 180;
-          const double north = (static_cast<double>(key.y) + tile.mesh.v[triangle[i]] / 32767.0) * side - 90;
+          const double east = (static_cast<double>(key.x) + tile.mesh.u[triangle[i]] / 32767.0) * kSide - 180;
+          const double north = (static_cast<double>(key.y) + tile.mesh.v[triangle[i]] / 32767.0) * kSide - 90;
           deepest = std::max(deepest, (kReach - std::abs(east - kLongitude) - std::abs(north - kLatitude)) / cell);
         }
       }
