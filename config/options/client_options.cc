@@ -186,7 +186,8 @@ void ReadTls(const Json& value, const ConfigLocation& place, Config& config) {
     return value.contains(key) && value[key].is_string() && IsPathOfFile(value[key].get_ref<const std::string&>());
   };
   if (!value.is_object() || value.size() != 2 || !is_path("certificate") || !is_path("key")) {
-    return place.Expected(R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files)");
+    return place.Expected(
+        R"({"certificate": "server.pem", "key": "server.key"}, the paths of two PEM files; as a flag server.pem,server.key)");
   }
   config.tls = {place.Resolve(value["certificate"].get<std::string>()), place.Resolve(value["key"].get<std::string>())};
 }

@@ -58,6 +58,7 @@ int Run(int argc, char** argv) {
     arguments.erase(arguments.begin());
     arguments.emplace_back("--help");
   }
+  if (const std::string empty = ExplainEmptyText(arguments); !empty.empty()) return Fail(empty, kExitUsage);
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11 expects them in reverse order
   try {
     app.parse(std::move(reversed));
@@ -68,6 +69,9 @@ int Run(int argc, char** argv) {
   }
   return exit_code;
 }
+
+// The kernel drops signals of the first process of a container that have no handler.
+void EndFirstProcess(int signal) { ::_exit(128 + signal); }
 
 }  // namespace
 }  // namespace terrace::cli
@@ -80,6 +84,9 @@ int main(int argc, char** argv) {
     if (opened < 0 || opened > STDERR_FILENO) break;
   }
   try {
+    for (const int signal : {SIGINT, SIGTERM}) {
+      if (::getpid() == 1) std::signal(signal, terrace::cli::EndFirstProcess);
+    }
     std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
     // Before there are threads.
     terrace::dem::ClearGdalEnvironment();

@@ -47,8 +47,7 @@ Result<tcp::endpoint> Resolve(asio::io_context& io, const std::string& host, std
 }
 
 const char* Remedy(const error_code& error) {
-  if (error == asio::error::address_in_use)
-    return "stop the process that uses it or choose another port, as in --listen 127.0.0.1:8081";
+  if (error == asio::error::address_in_use) return "stop the process that uses it, or choose another port";
   if (error == asio::error::access_denied) return "ports below 1024 need privileges; choose another port";
   return "choose an address of this machine";
 }

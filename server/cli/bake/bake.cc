@@ -240,6 +240,9 @@ void AddBake(CLI::App& app, int& exit_code) {
   command->callback([arguments, command, &exit_code] {
     if (!command->get_subcommands().empty()) return;
     while (arguments->out.size() > 1 && arguments->out.ends_with('/')) arguments->out.pop_back();
+    for (const char* flag : {"--arc-seconds", "--bytes-per-tile", "--ms-per-tile"}) {
+      arguments->has_assumptions |= command->count(flag) > 0;
+    }
     exit_code = FinishOutput(Bake(*arguments));
   });
 }

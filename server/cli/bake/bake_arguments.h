@@ -32,6 +32,7 @@ struct BakeArguments {
   bool finish = false, dry_run = false, json = false, yes = false, no_gzip = false;
   std::string catalogue;
   double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
+  bool has_assumptions = false;                                   // whether one of these three is given
   std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
 };
 

@@ -372,11 +372,20 @@ std::string WrongTogether(const BakeArguments& arguments) {
     if (arguments.format != "terrain" || arguments.form != kChunks || arguments.no_gzip || arguments.finish ||
         arguments.error > 0 || arguments.fraction > 0 || given(arguments.out) || given(arguments.update) ||
         given(arguments.into_cache) || given(arguments.codings) || given(arguments.extensions) ||
-        given(arguments.shard) || given(arguments.queue) || given(arguments.job) || !arguments.dataset_flags.empty()) {
+        given(arguments.shard) || given(arguments.queue) || given(arguments.job) ||
+        given(arguments.queue_password_file) || given(arguments.queue_ca) || arguments.threads > 0 || arguments.yes ||
+        !arguments.dataset_flags.empty() || !arguments.cache_flags.empty()) {
       return "--catalogue plans all terrain tiles at the default error: it takes --levels, --bbox, --arc-seconds, "
              "--bytes-per-tile, --ms-per-tile and --json, and no other option";
     }
     return {};
+  }
+  if (arguments.has_assumptions) {
+    return "--arc-seconds, --bytes-per-tile and --ms-per-tile are assumptions for --catalogue; for sources these "
+           "numbers are measured";
+  }
+  if (!arguments.dems.empty() && given(arguments.dataset) && arguments.dataset_flags.contains("name")) {
+    return "--dataset and --name both name the DEM's dataset; give one";
   }
   if (arguments.dems.empty() == arguments.config.empty()) {
     return arguments.dems.empty()

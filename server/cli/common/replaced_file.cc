@@ -27,8 +27,16 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 void RemoveAndEnd(int signal) {
   if (has_file.load()) ::unlink(path_of_file.data());
+  if (::getpid() == 1) ::_exit(128 + signal);  // the kernel would drop the signal
   ::signal(signal, SIG_DFL);
   ::raise(signal);
+}
+
+// In the folder of `target`, and not longer than a name may be.
+std::string TemporaryName(const fs::path& target) {
+  constexpr std::size_t kMaxNameBytes = NAME_MAX - 32;
+  return target.parent_path() /
+         fmt::format("{}.{}.part", target.filename().string().substr(0, kMaxNameBytes), getpid());
 }
 
 fs::path TargetOf(const fs::path& path) {
@@ -69,7 +77,7 @@ TemporaryFile::~TemporaryFile() {
 ReplacedFile::ReplacedFile(std::string path, fs::path target)
     : path_(std::move(path)),
       target_(std::move(target)),
-      temporary_(std::make_unique<TemporaryFile>(fmt::format("{}.{}.part", target_.string(), getpid()))),
+      temporary_(std::make_unique<TemporaryFile>(TemporaryName(target_))),
       stream_(temporary_->path(), std::ios::binary) {}
 
 Result<ReplacedFile> ReplacedFile::Open(const std::string& path) {

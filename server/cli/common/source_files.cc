@@ -122,6 +122,13 @@ Result<void> CheckSourcePolicy(const config::DatasetConfig& dataset) {
       if (!allowed) return checked(allowed);
     }
   }
+  std::vector<std::string> verticals = {dataset.vertical};
+  for (const config::SourceConfig& source : dataset.sources) verticals.push_back(source.vertical.value_or(""));
+  for (const std::string& vertical : verticals) {
+    std::error_code ignored;  // as dem::ResolveVertical: a grid of undulations
+    if (!std::filesystem::exists(vertical, ignored)) continue;
+    if (const Result<void> allowed = dem::CheckPlainFile(vertical); !allowed) return checked(allowed);
+  }
   for (const std::string* layer : {&dataset.imagery.image, &dataset.water.mask}) {
     if (layer->empty()) continue;
     if (const Result<void> allowed = dem::CheckSourceName(*layer); !allowed) return checked(allowed);

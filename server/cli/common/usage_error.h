@@ -19,4 +19,8 @@ bool HasUnknownCommand(const CLI::App& program, const std::vector<std::string>& 
 std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
                          const std::vector<std::string>& arguments);
 
+// Returns what is wrong with an option that is given an empty text, which commands take for an option that is not
+// given; empty: nothing. Options of the configuration decide themselves, because some may be empty.
+std::string ExplainEmptyText(const std::vector<std::string>& arguments);
+
 }  // namespace terrace::cli

@@ -71,7 +71,10 @@ int RunFly(const FlyArguments& arguments) {
   if (!options) return Fail(options.error().message, kExitUsage);
   const Result<std::vector<fly::Requirement>> requirements = fly::ParseRequirements(arguments.require);
   if (!requirements) return Fail(requirements.error().message, kExitUsage);
-  if (!arguments.report.empty() && arguments.report == arguments.urls) {
+  std::error_code ignored;
+  if (!arguments.report.empty() && !arguments.urls.empty() &&
+      std::filesystem::weakly_canonical(arguments.report, ignored) ==
+          std::filesystem::weakly_canonical(arguments.urls, ignored)) {
     return Fail("--report and --urls name the same file; give two", kExitUsage);
   }
   for (const std::string& path : {arguments.report, arguments.urls}) {

@@ -33,7 +33,12 @@ int CheckStart(const config::Config& config, const config::Config& served,
       note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
     }
   }
-  if (!config.shared_cache.url.empty()) note(server::CheckSharedCache(config.shared_cache));
+  bool is_wrong_text = false;
+  if (!config.shared_cache.url.empty()) {
+    const Result<void> shared = server::CheckSharedCache(config.shared_cache);
+    is_wrong_text = !shared && shared.error().code == ErrorCode::kInvalidArgument;
+    note(shared);
+  }
   if (!descriptors) errors.push_back(descriptors.error());
   if (tries_address) note(server::Server::CheckAddress(served));
   const Result<void> policy =
@@ -45,7 +50,7 @@ int CheckStart(const config::Config& config, const config::Config& served,
     if (readable) note(CheckEditFiles(dataset));
   }
   for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
-  if (!policy) return kExitUsage;
+  if (!policy || is_wrong_text) return kExitUsage;
   return errors.empty() ? kExitOk : kExitFailure;
 }
 

@@ -1,12 +1,15 @@
 """Runs the terrace binary without serving: cli_test.py BINARY SOURCE_DIR."""
 import hashlib
 import json
+import os
 import pathlib
 import re
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -101,6 +104,14 @@ class Usage(unittest.TestCase):
                                    (["mesh", "a.tif", "-p", "4", "--out", "c.obj"], "unknown option -p"),
                                    (["mesh", "a.tif", "--points", "x", "--out", "c.obj"], '--points: must be a whole number from 4 (the corners of the raster) to 1000000000, not "x"')):
             self.assertEqual(run(*arguments).stderr.splitlines()[0], f"terrace: {message}", arguments)
+
+    def test_empty_texts_are_refused(self):
+        for arguments in (["serve", "a.tif", "--config"], ["bake", "a.tif", "--dry-run", "--levels"], ["bake", "a.tif", "--out", "b", "--queue"],
+                          ["mesh", "a.tif", "--out", "c.obj", "--bbox"], ["info", "a.tif", "--draw"], ["fly", "http://a/b", "--report"]):
+            result = run(*arguments, "")
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn(f"terrace: {arguments[-1]} is followed by an empty text", result.stderr)
+        self.assertEqual(run("serve", "--cache-dir", "", "--print-config").returncode, 0, "an empty text is a value")
 
     def test_typos_are_told_with_the_nearest_name(self):
         for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
@@ -243,6 +254,46 @@ class Config(unittest.TestCase):
         self.assertEqual(run("serve", "--config", fine, "--check-config").returncode, 0)
         # A created file would belong to the user who checks, who may differ from the server's user.
         self.assertFalse((self.folder / "x").exists() or (self.folder / "access.log").exists())
+
+    def test_grids_lie_in_the_data_roots(self):
+        (self.folder / "roots").mkdir()
+        (self.folder / "roots/a.tif").symlink_to(SOURCE_DIR / "config/samples/jacksboro.tif")
+        (self.folder / "grid.tif").write_bytes(b"")
+        for dataset in ({"sources": ["roots"], "vertical": "./grid.tif"}, {"sources": [{"path": "roots", "vertical": "./grid.tif"}]}):
+            file = self.write(json.dumps({"data_roots": ["roots", str(SOURCE_DIR)], "datasets": [{"name": "a", **dataset}]}))
+            result = run("serve", "--config", file, "--check-config")
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn("grid.tif: lies outside of the data roots", result.stderr)
+
+    def test_a_wrong_url_of_the_shared_cache_is_a_wrong_argument(self):
+        result = run("serve", SOURCE_DIR / "config/samples/jacksboro.tif", "--shared-cache", "redis://h:99999/0", "--check-config")
+        self.assertEqual((result.returncode, result.stdout), (2, ""), result.stderr)
+
+    def test_bakes_take_no_options_in_vain(self):
+        cells = ["bake", "--catalogue", self.write("N46E008\n"), "--dry-run"]
+        for arguments, message in ((["bake", "a.tif", "--dry-run", "--ms-per-tile", "2"], "are assumptions for --catalogue"),
+                                   (["bake", "a.tif", "--dry-run", "--dataset", "b", "--name", "c"], "--dataset and --name both name"),
+                                   ([*cells, "--yes"], "and no other option"), ([*cells, "--threads", "2"], "and no other option")):
+            result = run(*arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn(message, result.stderr)
+        self.assertEqual(run(*cells, "--ms-per-tile", "2").returncode, 0)
+
+    def test_the_first_process_of_a_container_ends_by_sigterm(self):
+        inside = ["unshare", "--user", "--map-root-user", "--pid", "--fork", "--kill-child", "--mount-proc"]
+        if subprocess.run([*inside, "true"], stderr=subprocess.DEVNULL, check=False).returncode != 0:
+            self.skipTest("no namespaces")
+        out = self.folder / "first.obj"
+        process = subprocess.Popen([*inside, "sh", "-c", 'exec "$0" "$@"', BINARY, "mesh", SOURCE_DIR / "config/samples/etopo5.tif", "--out", out, "--rms", "0"],
+                                   stderr=subprocess.DEVNULL)
+        until = time.monotonic() + 60
+        while not list(out.parent.glob("first.obj.*.part")):
+            self.assertLess(time.monotonic(), until)
+            time.sleep(0.02)
+        child = int(subprocess.run(["pgrep", "-P", str(process.pid)], stdout=subprocess.PIPE, check=True).stdout)
+        os.kill(child, signal.SIGTERM)
+        self.assertEqual(process.wait(60), 143)
+        self.assertEqual(list(out.parent.glob("first.obj*")), [])
 
     def test_an_option_without_effect_is_warned_of(self):
         file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [str(SOURCE_DIR / "config/samples/jacksboro.tif")]}],
