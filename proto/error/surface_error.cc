@@ -84,7 +84,7 @@ class Ground {
     const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
     if (width > 0.5) return {kUnknown, kUnknown};
     const double heights = std::abs(rise_m) / geo::kSmallestRadius;
-    // Half the width squared times sin cos / 4, and the ratio of the radii of curvature.
+    // width^2 sin cos / 8, times the ratio of the radii of curvature
     const double y = kCurvatureMargin * width * width / 16 + height * (heights / 4 + height * (0.005 + height));
     if (width == 0) return {0, y / step_};
     // For the whole tile if that is tight enough, else for the chord's rows.
