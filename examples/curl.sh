@@ -5,7 +5,7 @@
 set -eu
 server=${1:-http://127.0.0.1:8080}
 datasets=$(curl -fsS "$server/datasets")
-dataset=${2:-$(echo "$datasets" | sed -n 's/^{"datasets":\[{"name":"\([^"]*\)".*/\1/p')}
+dataset=${2:-$(printf '%s' "$datasets" | sed -n 's/^{"datasets":\[{"name":"\([^"]*\)".*/\1/p')}
 [ "$dataset" ] || { echo "curl.sh: $server shows no dataset: all are being prepared, or need a token" >&2; exit 1; }
 folder=$(mktemp -d)
 
@@ -23,7 +23,7 @@ get "$server/$dataset/layer.json"
 get "$server/$dataset/tiles.json"
 
 # The height at the centre of the dataset, and the tile of the deepest level there.
-bounds=$(echo "$datasets" | sed 's/.*"name":"'"$dataset"'"[^}]*"bounds":\[\([^]]*\)\].*/\1/')
+bounds=$(printf '%s' "$datasets" | sed 's/.*"name":"'"$dataset"'"[^}]*"bounds":\[\([^]]*\)\].*/\1/')
 middle=$(echo "$bounds" | awk -F, '{ lon = ($1 + $3 + 360 * ($1 > $3)) / 2; printf "%.6f,%.6f", ($2 + $4) / 2, lon - 360 * (lon > 180) }')
 get "$server/$dataset/heights?locations=$middle&certify=deepest"
 tile=$(curl -fsS "$server/$dataset/heights?locations=$middle&certify=deepest" | sed 's/.*"tile":"\([^"]*\)".*/\1/')
