@@ -4,7 +4,9 @@
 #     examples/curl.sh [http://HOST:PORT] [DATASET]
 set -eu
 server=${1:-http://127.0.0.1:8080}
-dataset=${2:-$(curl -fsS "$server/datasets" | sed 's/[^[]*\[{"name":"\([^"]*\)".*/\1/')}
+datasets=$(curl -fsS "$server/datasets")
+dataset=${2:-$(printf '%s' "$datasets" | sed -n 's/^{"datasets":\[{"name":"\([^"]*\)".*/\1/p')}
+[ "$dataset" ] || { echo "curl.sh: $server shows no dataset: all are being prepared, or need a token" >&2; exit 1; }
 folder=$(mktemp -d)
 
 # Prints the command and runs it.
@@ -21,7 +23,7 @@ get "$server/$dataset/layer.json"
 get "$server/$dataset/tiles.json"
 
 # The height at the centre of the dataset, and the tile of the deepest level there.
-bounds=$(curl -fsS "$server/datasets" | sed 's/.*"name":"'"$dataset"'"[^}]*"bounds":\[\([^]]*\)\].*/\1/')
+bounds=$(printf '%s' "$datasets" | sed 's/.*"name":"'"$dataset"'"[^}]*"bounds":\[\([^]]*\)\].*/\1/')
 middle=$(echo "$bounds" | awk -F, '{ lon = ($1 + $3 + 360 * ($1 > $3)) / 2; printf "%.6f,%.6f", ($2 + $4) / 2, lon - 360 * (lon > 180) }')
 get "$server/$dataset/heights?locations=$middle&certify=deepest"
 tile=$(curl -fsS "$server/$dataset/heights?locations=$middle&certify=deepest" | sed 's/.*"tile":"\([^"]*\)".*/\1/')
@@ -39,7 +41,8 @@ north=$(echo "$middle" | awk -F, '{ printf "%.6f,%.6f", $1 + 0.009, $2 }')
 get --data-urlencode "path=$middle|$north" --data-urlencode samples=5 "$server/$dataset/heights"
 
 # One mesh of 0.05 x 0.05 degrees, as Wavefront OBJ.
-box=$(echo "$middle" | awk -F, '{ printf "%.6f,%.6f,%.6f,%.6f", $2 - 0.025, $1 - 0.025, $2 + 0.025, $1 + 0.025 }')
+box=$(echo "$middle" | awk -F, 'function wrap(lon) { return lon + 360 * (lon < -180) - 360 * (lon > 180) }
+  { printf "%.6f,%.6f,%.6f,%.6f", wrap($2 - 0.025), $1 - 0.025, wrap($2 + 0.025), $1 + 0.025 }')
 get -D - -o "$folder/area.obj" "$server/$dataset/mesh?bbox=$box&error=20&format=obj"
 
 ls -l "$folder"/*

@@ -58,6 +58,8 @@ def main():
     arguments = parser.parse_args()
 
     datasets = {dataset["name"]: dataset for dataset in json.loads(fetch(f"{arguments.server}/datasets")[0])["datasets"]}
+    if not datasets:
+        sys.exit(f"{arguments.server} shows no dataset: all are being prepared, or need a token")
     name = arguments.dataset or next(iter(datasets))
     if name not in datasets:
         sys.exit(f"{arguments.server} has no dataset {name}; it has {', '.join(datasets)}")
@@ -75,7 +77,8 @@ def main():
         tile, headers = fetch(f"{arguments.server}/{name}/{result['tile']}.terrain")
         vertices, triangles = decode(tile)
         span = 180 / 2**level  # degrees; columns count from 180 W, rows from the South Pole
-        drawn = height_at(vertices, triangles, (longitude + 180) / span - column, (latitude + 90) / span - row)
+        u = (longitude + 180) / span % (2 * 2**level) - column  # 180 E is 180 W, in column 0
+        drawn = height_at(vertices, triangles, u, (latitude + 90) / span - row)
         print(f"{latitude}, {longitude}: {result['elevation']} m in {name}; tile {result['tile']} with {len(vertices)} vertices and "
               f"{len(triangles)} triangles has {drawn:.2f} m, and is at most {headers['Terrain-Certified-Error']} m off anywhere")
 

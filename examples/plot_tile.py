@@ -22,8 +22,7 @@ import numpy
 
 is_script = sys.argv[0].endswith("plot_tile.py")
 arguments = sys.argv[1:] if is_script else []
-dataset, out, level, error = arguments + [os.environ.get("TERRACE_DATASET", "http://127.0.0.1:8080/jacksboro"), "tile.png", 10, 20][len(arguments):]
-level = int(level)
+dataset, out, level, error = arguments + [os.environ.get("TERRACE_DATASET", "http://127.0.0.1:8080/jacksboro"), "tile.png", None, 20][len(arguments):]
 
 
 def fetch(url, body=None, kind="application/json"):
@@ -39,10 +38,14 @@ def fetch(url, body=None, kind="application/json"):
 
 # %%
 server, name = dataset.rsplit("/", 1)
-about = next(entry for entry in json.loads(fetch(f"{server}/datasets")[0])["datasets"] if entry["name"] == name)
+about = next((entry for entry in json.loads(fetch(f"{server}/datasets")[0])["datasets"] if entry["name"] == name), None)
+if not about:
+    sys.exit(f"{server} shows no dataset {name}: it is being prepared, needs a token, or has another name")
 west, south, east, north = about.get("finest_bounds", about["bounds"])
+level = int(level or min(10, about["max_level"]))
 span = 180 / 2**level
-column, row = int(((west + east) / 2 + 180) / span), int(((south + north) / 2 + 90) / span)
+east += 360 * (west > east)  # across the antimeridian west is above east, and columns begin again at 0
+column, row = int(((west + east) / 2 + 180) / span) % (2 * 2**level), int(((south + north) / 2 + 90) / span)
 tile, headers = fetch(f"{dataset}/{level}/{column}/{row}.terrain?error={error}")
 print(f"tile {level}/{column}/{row}: {len(tile)} bytes, at most {headers['Terrain-Max-Error']} m off the samples of its level")
 

@@ -20,9 +20,13 @@ def layers(dataset, folder, tiles):
     """The mesh of the middle fifth of a dataset, and the raster of its height tiles."""
     server, name = dataset.rsplit("/", 1)
     with urllib.request.urlopen(f"{server}/datasets") as reply:
-        about = next(entry for entry in json.load(reply)["datasets"] if entry["name"] == name)
+        about = next((entry for entry in json.load(reply)["datasets"] if entry["name"] == name), None)
+    if not about:
+        sys.exit(f"{server} shows no dataset {name}: it is being prepared, needs a token, or has another name")
     west, south, east, north = about["bounds"]
-    box = ",".join(str(low + share * (high - low)) for share in (0.4, 0.6) for low, high in ((west, east), (south, north)))
+    east += 360 * (west > east)  # across the antimeridian west is above east
+    corners = [(west + share * (east - west), south + share * (north - south)) for share in (0.4, 0.6)]
+    box = ",".join(f"{(longitude + 180) % 360 - 180},{latitude}" for longitude, latitude in corners)
     with urllib.request.urlopen(f"{dataset}/mesh?bbox={box}&error=5&format=ply&coordinates=geographic") as reply:
         pathlib.Path(folder, "area.ply").write_bytes(reply.read())
     mesh, raster = QgsMeshLayer(str(folder / "area.ply"), f"{name}, mesh", "mdal"), QgsRasterLayer(str(tiles), f"{name}, height tiles")

@@ -22,14 +22,20 @@ def post(url, body):
         return numpy.frombuffer(reply.read(), "<f4")
 
 
+def wrapped(longitude):
+    """The longitude from -180 to 180: a map across the antimeridian reaches beyond."""
+    return (longitude + 180) % 360 - 180
+
+
 def main(dataset, out, place, eye="2", radius="0.15", side="301"):
     latitude, longitude = map(float, place.split(","))
     radius, side = float(radius), int(side)
     wide = radius / math.cos(math.radians(latitude))
     box = (longitude - wide, latitude - radius, longitude + wide, latitude + radius)
-    with urllib.request.urlopen(f"{dataset}/grid?bbox={','.join(map(str, box))}&width={side}&height={side}") as reply:
+    west, south, east, north = wrapped(box[0]), box[1], wrapped(box[2]), box[3]
+    with urllib.request.urlopen(f"{dataset}/grid?bbox={west},{south},{east},{north}&width={side}&height={side}") as reply:
         ground = numpy.frombuffer(reply.read(), "<f4").reshape(side, side)
-    xs, ys = numpy.linspace(box[0], box[2], side), numpy.linspace(box[3], box[1], side)
+    xs, ys = wrapped(numpy.linspace(box[0], box[2], side)), numpy.linspace(box[3], box[1], side)
     foot, = post(f"{dataset}/heights", struct.pack("<2d", longitude, latitude))
     if numpy.isnan(foot):
         sys.exit(f"{place}: the dataset has no height there")

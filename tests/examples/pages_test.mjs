@@ -74,6 +74,11 @@ function meshHeight({ longitude, latitude }) {
 
 describe('the pages of examples/', () => {
   let server, files, browser;
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace-pages-'));
+  const inFolder = (name, text) => {
+    fs.writeFileSync(path.join(folder, name), text);
+    return path.join(folder, name);
+  };
 
   before(async () => {
     server = await serve('--config', path.join(samples, 'samples.json'));
@@ -84,6 +89,7 @@ describe('the pages of examples/', () => {
     await browser?.close();
     await files?.stop();
     await server?.stop();
+    fs.rmSync(folder, { recursive: true });
   });
 
   // The server's height there, the deepest tile, and its largest permitted distance from the height.
@@ -307,6 +313,51 @@ describe('the pages of examples/', () => {
       await settle(page, 'true', 0);
       assert.match(await line(page), said);
       await page.close();
+    }
+  });
+
+  it('every page says that a server shows no dataset', async () => {
+    const closed = await serve('--config', inFolder('closed.json', JSON.stringify({
+      datasets: [{ name: 'hills', sources: [path.join(samples, 'jacksboro.tif')] }], tokens: [{ name: 'key', token: 'k'.repeat(16) }] })));
+    try {
+      for (const name of Object.keys(pages)) {
+        const page = await openPage(browser, `file://${kExamples}/${name}.html?server=${closed.url}`);
+        await settle(page, 'true', 0);
+        assert.match(await line(page), new RegExp(`^${closed.url}: shows no dataset: `), name);
+        await page.close();
+      }
+    } finally {
+      await closed.stop();
+    }
+  });
+
+  it('MapLibre and three.js draw flat ground, and ground below the sea', async () => {
+    const grid = (name, height) => {
+      const rows = Array.from({ length: 40 }, (_, row) => Array.from({ length: 40 }, (_, column) => height(row, column)).join(' '));
+      inFolder(`${name}.prj`, 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]');
+      return inFolder(`${name}.asc`, `ncols 40\nnrows 40\nxllcorner 7\nyllcorner 46\ncellsize 0.005\n${rows.join('\n')}\n`);
+    };
+    const grids = [grid('flat', () => 100), grid('sea', () => 0), grid('bay', (row, column) => -300 + 200 * Math.sin(row / 5) * Math.cos(column / 7))];
+    const special = await serve(...grids);
+    try {
+      for (const dataset of ['flat', 'sea', 'bay']) {
+        for (const name of ['maplibre', 'three']) {
+          const page = await openPage(browser, `file://${kExamples}/${name}.html?server=${special.url}&dataset=${dataset}`);
+          await settle(page, pages[name].ready);
+          assert.match(await line(page), new RegExp(`^${dataset} of ${special.url} as `));
+          assert.deepEqual(page.wrongs, []);
+          if (name === 'three') {
+            assert.ok(await page.evaluate(() => {
+              const shades = [];
+              example.tiles.group.traverse(({ geometry }) => geometry && shades.push(...geometry.attributes.color.array));
+              return shades.length > 0 && shades.every((shade) => shade >= 0 && shade <= 1);
+            }), dataset);
+          }
+          await page.close();
+        }
+      }
+    } finally {
+      await special.stop();
     }
   });
 

@@ -1,11 +1,15 @@
-"""Runs the examples for Python with numpy, GDAL, QGIS and Blender, and compares what they read with /heights.
+"""Runs the examples for Python with numpy, GDAL, QGIS and Blender, and compares what they read with /heights. Those for every dataset are
+also run on data across the antimeridian, and on servers that show no dataset.
 
     programs_test.py TERRACE SOURCE_DIR
 
 QGIS and Blender are large, so tools/install_deps.sh does not install them; what is missing is named and skipped.
 """
+import functools
+import http.server
 import importlib.util
 import json
+import math
 import os
 import pathlib
 import re
@@ -14,6 +18,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 import urllib.request
 
@@ -43,19 +48,25 @@ def python_with(*modules):
     return None
 
 
+def start(test_class, *options):
+    """The address of a server that ends with the tests of the class."""
+    server = subprocess.Popen([TERRACE, "serve", *options, "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    test_class.addClassCleanup(server.communicate, timeout=60)
+    test_class.addClassCleanup(server.terminate)
+    return re.search(r"http://[^/\s]+", server.stdout.readline())[0]
+
+
+def temporary_folder(test_class):
+    folder = pathlib.Path(tempfile.mkdtemp())
+    test_class.addClassCleanup(shutil.rmtree, folder)
+    return folder
+
+
 class Programs(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.server = subprocess.Popen([TERRACE, "serve", "--config", ROOT / "config/samples/samples.json", "--listen", "127.0.0.1:0"],
-                                      stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        cls.url = re.search(r"http://[^/\s]+", cls.server.stdout.readline())[0]
-        cls.folder = pathlib.Path(tempfile.mkdtemp())
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.server.terminate()
-        cls.server.communicate(timeout=60)
-        shutil.rmtree(cls.folder)
+        cls.url = start(cls, "--config", ROOT / "config/samples/samples.json")
+        cls.folder = temporary_folder(cls)
 
     def heights(self, *places):
         locations = "|".join(f"{lat},{lon}" for lat, lon in places)
@@ -147,5 +158,82 @@ class Programs(unittest.TestCase):
         self.assertTrue(picture.with_suffix(".blend").exists())
 
 
+class AcrossTheAntimeridian(unittest.TestCase):
+    """Hills from 179 E to 179 W, 18 to 16 S: their middle is the antimeridian."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = temporary_folder(cls)
+        rows = (" ".join(f"{300 + 200 * math.sin(row / 5) * math.cos(column / 7):.2f}" for column in range(40)) for row in range(40))
+        (cls.folder / "fiji.asc").write_text("ncols 40\nnrows 40\nxllcorner 179\nyllcorner -18\ncellsize 0.05\n" + "\n".join(rows) + "\n")
+        (cls.folder / "fiji.prj").write_text('GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+                                             'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
+        cls.url = start(cls, cls.folder / "fiji.asc")
+
+    def test_heights_are_read_off_tiles_on_both_sides(self):
+        said = run(EXAMPLES / "heights.py", "--server", self.url)
+        said += run(EXAMPLES / "heights.py", "--server", self.url, "--", "-17,-180", "-17.01,179.99", "-16.99,-179.99")
+        found = re.findall(r"(\S+), (\S+): ([\d.]+) m in fiji; tile (\S+) .* has ([\d.]+) m, and is at most ([\d.]+) m off", said)
+        self.assertEqual([(latitude, longitude) for latitude, longitude, *_ in found],
+                         [("-17", "180"), ("-17", "-180"), ("-17.01", "179.99"), ("-16.99", "-179.99")], said)
+        for _, _, height, _, drawn, error in found:
+            self.assertLess(abs(float(height) - float(drawn)), float(error), said)
+        self.assertEqual([int(tile.split("/")[1]) == 0 for _, _, _, tile, _, _ in found], [True, True, False, True], said)
+
+    def test_curl_fetches_a_mesh_of_both_sides(self):
+        said = run(EXAMPLES / "curl.sh", self.url, TMPDIR=str(self.folder))
+        self.assertIn("bbox=179.975000,-17.025000,-179.975000,-16.975000", said)
+        area, = self.folder.glob("tmp.*/area.obj")
+        self.assertRegex(area.read_text(), r"(?m)^v -?\d")
+
+    def test_numpy_draws_the_tile_in_the_middle(self):
+        python = python_with("numpy")
+        if not python:
+            self.skipTest("SKIPPED: needs python3-numpy")
+        picture = self.folder / "tile.png"
+        said = run(python, EXAMPLES / "plot_tile.py", f"{self.url}/fiji", picture)
+        self.assertIn("tile 7/0/51:", said)  # the deepest level, the first column east of the antimeridian
+        most, certified = map(float, re.search(r"up to ([\d.]+) m from the source, .*certified: ([\d.]+) m", said).groups())
+        self.assertLessEqual(most, certified)
+        self.assertTrue(picture.exists())
+
+    def test_matplotlib_maps_what_is_seen_on_both_sides(self):
+        python = python_with("matplotlib")
+        if not python:
+            self.skipTest("SKIPPED: needs python3-matplotlib")
+        counts = []
+        for longitude in ("179.6", "180", "-180"):  # the view of 179.6 lies west of the antimeridian
+            said = run(python, EXAMPLES / "view_map.py", f"{self.url}/fiji", self.folder / "view.png", f"-17,{longitude}", "100", "0.2", "21")
+            counts.append(list(map(int, re.findall(r"\d+", said))))
+        for seen, hidden, unknown in counts:
+            self.assertTrue(seen > 0 and hidden > 0 and unknown == 0 and seen + hidden == 21 * 21, counts)
+        self.assertEqual(counts[1], counts[2])
+
+
+class Files(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+class NoDatasets(unittest.TestCase):
+    def test_a_sentence_says_so(self):
+        folder = temporary_folder(type(self))
+        (folder / "closed.json").write_text(json.dumps({
+            "datasets": [{"name": "hills", "sources": [str(ROOT / "config/samples/jacksboro.tif")]}], "tokens": [{"name": "key", "token": 16 * "k"}]}))
+        (folder / "datasets").write_text('{"datasets":[],"preparing":[{"name":"hills","percent":3}]}\n')
+        files = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=folder))
+        self.addCleanup(files.server_close)
+        threading.Thread(target=files.serve_forever, daemon=True).start()
+        self.addCleanup(files.shutdown)
+        python = python_with("numpy")
+        for url in (start(type(self), "--config", folder / "closed.json"), f"http://127.0.0.1:{files.server_port}"):
+            for command in ((EXAMPLES / "heights.py", "--server", url), (EXAMPLES / "curl.sh", url),
+                            *([(python, EXAMPLES / "plot_tile.py", f"{url}/hills", folder / "tile.png")] if python else [])):
+                with self.subTest(command=command):
+                    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+                    self.assertEqual(done.returncode, 1)
+                    self.assertRegex(done.stderr, rf"\A(curl.sh: )?{url} shows no dataset.*\n\Z")
+
+
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)  # says what is skipped, and why
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)  # says what is skipped, and why
