@@ -35,7 +35,7 @@ if [[ -z $work ]]; then
   trap 'rm -rf "$work"' EXIT
 fi
 mkdir -p "$work" "$out"
-rm -f "$out"/terrace[-_]* "$out"/SHA256SUMS*
+find "$out" -maxdepth 1 -type f \( -name 'terrace[-_]*' -o -name 'SHA256SUMS*' \) -delete  # of an earlier run
 
 # The time stamps of git archive are those of the commit.
 git -C "$root" archive --format=tar --prefix="terrace-$version/" "$commit" | gzip -9n > "$out/terrace-$version.tar.gz"
@@ -64,5 +64,5 @@ cp "$work/deb/$deb" "$out/"
 
 cp "$tree/docker/Dockerfile" "$out/terrace-$version.Dockerfile"
 "$tree/tools/write_sbom.py" "$out/$deb" "$out/terrace-$version.cdx.json" > /dev/null
-(cd "$out" && sha256sum -- terrace[-_]* > SHA256SUMS.part && mv SHA256SUMS.part SHA256SUMS)
+(cd "$out" && find . -maxdepth 1 -type f -name 'terrace[-_]*' -printf '%f\0' | sort -z | xargs -0 sha256sum -- > SHA256SUMS.part && mv SHA256SUMS.part SHA256SUMS)
 (cd "$out" && cat SHA256SUMS)

@@ -109,7 +109,7 @@ def run_suite(suite, jobs):
     report = build / "ctest.xml"
     report.unlink(missing_ok=True)
     # Most tests wait for a server or a clock most of the time, hence twice as many jobs. Tests that need all processors
-    # run alone. The timeout ends tests that hang; on a slow or loaded machine none may come near it.
+    # run alone. The timeout ends tests that hang. Tests must stay far below it, also on a loaded machine.
     ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(2 * jobs),
              "--timeout", "600", "--output-junit", str(report)]
     if suite.choice:

@@ -22,7 +22,9 @@ terrace=${TERRACE:-terrace}
 if [[ -z ${SLURM_ARRAY_TASK_ID:-} ]]; then  # on the login node
   # "ID;CLUSTER" where there are several clusters
   job=$(sbatch --parsable --export=ALL "$0")
-  exec sbatch --dependency="afterok:${job%%;*}" --array=0 --export=ALL,FINISH=1 "$0"
+  clusters=()
+  [[ $job == *";"* ]] && clusters=(--clusters="${job#*;}")
+  exec sbatch "${clusters[@]}" --dependency="afterok:${job%%;*}" --array=0 --export=ALL,FINISH=1 "$0"
 fi
 # A task runs once at a time, so a lock is of a run that was ended on another node.
 if [[ -n ${FINISH:-} ]]; then

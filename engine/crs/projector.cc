@@ -89,14 +89,19 @@ void Projector::Inverse(std::span<Position> positions) const { Transform(positio
 Result<std::string> EpsgWkt(const std::string& code) {
   static std::mutex mutex;
   static std::map<std::string, std::string> known;
-  const std::lock_guard lock(mutex);
-  if (const auto found = known.find(code); found != known.end()) return found->second;
+  {
+    const std::lock_guard lock(mutex);
+    if (const auto found = known.find(code); found != known.end()) return found->second;
+  }
   const ProjContextPtr context = MakeProjContext();
   const ProjObjectPtr crs(proj_create_from_database(context.get(), "EPSG", code.c_str(), PJ_CATEGORY_CRS,
                                                     /*usePROJAlternativeGridNames=*/0, nullptr));
   const char* const options[] = {"MULTILINE=NO", nullptr};
   const char* text = crs == nullptr ? nullptr : proj_as_wkt(context.get(), crs.get(), PJ_WKT2_2019, options);
-  if (text != nullptr) return known.emplace(code, text).first->second;
+  if (text != nullptr) {
+    const std::lock_guard lock(mutex);
+    return known.emplace(code, text).first->second;
+  }
   if (proj_context_get_database_metadata(context.get(), "EPSG.VERSION") == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "PROJ cannot read its database");
   }

@@ -70,7 +70,7 @@ Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Req
   response.content_type = plan.content_type;
   response.content_encoding = tiler::NameOf(made.coding);
   response.body = made.body;
-  response.etag = plan.generation ? EtagOf(plan, CodingFor(request)) : made.etag;
+  response.etag = plan.generation && made.is_final ? EtagOf(plan, CodingFor(request)) : made.etag;
   response.cache_control = made.is_final ? plan.cache_control : kRevalidate;
   response.vary = "Accept-Encoding";
   response.depends_on_token = plan.depends_on_token;

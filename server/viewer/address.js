@@ -1,4 +1,4 @@
-// The view in the address bar, which follows it without adding to the history.
+// Writes the current view into the address bar, without adding to the history.
 const kPauseMs = 400;  // Safari throws after 100 changes in 30 s, Firefox after 200 in 10 s
 
 export class Address {

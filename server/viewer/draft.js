@@ -56,7 +56,7 @@ export class Draft {
     this.onMode(undefined);
   }
 
-  // The last corner again, as by a double click, is none.
+  // The last corner again, as by a double click, is ignored.
   add(ground) {
     const last = this.corners.at(-1);
     if (last && last.longitude === ground.longitude && last.latitude === ground.latitude) return undefined;

@@ -1,7 +1,7 @@
 // The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
 // colours by height or the dataset's image, shading, and contours. Dragging, wheel or two fingers, arrow keys, plus and minus
 // move it; a click reads a height.
-import { pendingText } from "/viewer/access.js";
+import { pendingText, UnknownToken } from "/viewer/access.js";
 import { heightColour, niceInterval, waterline } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
@@ -266,7 +266,8 @@ async function listWhenThere(fail) {
       if (list.datasets.length > 0 || list.preparing.length === 0) return list;
       fail(list.preparing.map((pending) => pendingText(pending)).join(" "));
     } catch (error) {
-      fail(`The list of datasets could not be read: ${error.message}. Is the server running?`);
+      if (error instanceof UnknownToken) access.token = "";  // there is no field for another one
+      else fail(`The list of datasets could not be read: ${error.message}. Is the server running?`);
     }
     await new Promise((resolve) => setTimeout(resolve, kPendingMs));
   }

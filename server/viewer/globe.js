@@ -290,8 +290,8 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // Metres from the camera to the ground in the middle of the view. Where none is drawn, to the ellipsoid, or to one below
-  // the camera if that is deeper.
+  // Metres from the camera to the ground in the middle of the view. If no ground is drawn there, the ellipsoid counts as
+  // ground. If the camera is below the ellipsoid, a lower one counts, on which the ground below the camera lies.
   get #distance() {
     const { camera, canvas, ellipsoid } = this.scene;
     const at = { x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 };
@@ -323,8 +323,9 @@ export class Globe {
     const handler = new ScreenSpaceEventHandler(canvas);
     const middle = () => ({ x: canvas.clientWidth / 2, y: canvas.clientHeight / 2 });
     const steer = () => this.onSteer?.();
-    for (const type of ["pointerdown", "wheel"]) canvas.addEventListener(type, steer, { passive: true });
-    // The second click of a double click is none. A slow machine handles both late, so the time of the event counts.
+    canvas.addEventListener("wheel", steer, { passive: true });
+    canvas.addEventListener("pointermove", ({ buttons }) => buttons && steer());
+    // The second click of a double click is ignored. A slow machine handles both late, so the time of the event counts.
     let released = 0;
     let last = { at: -Infinity };
     canvas.addEventListener("pointerup", ({ timeStamp }) => (released = timeStamp), true);

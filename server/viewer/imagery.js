@@ -5,7 +5,7 @@ import { GeographicTilingScheme, Rectangle, Resource, UrlTemplateImageryProvider
 // so such a one has a layer on each side.
 export function addImagery(scene, template, { bounds, attribution, geodetic_max_level: maximumLevel }, headers, onError) {
   const [west, south, east, north] = bounds;
-  const boxes = east < west ? [[west, south, 180, north], [-180, south, east, north]] : [bounds];
+  const boxes = east < west ? [[west, south, 180, north], [-180, south, east, north]].filter((box) => box[0] < box[2]) : [bounds];
   for (const box of boxes) {
     const provider = new UrlTemplateImageryProvider({
       url: new Resource({ url: template.replace("{y}", "{reverseY}"), headers }),

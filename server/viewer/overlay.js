@@ -5,7 +5,7 @@ import { Cartesian2, Cartesian3, Ellipsoid, EllipsoidalOccluder, SceneTransforms
 
 const kSvg = "http://www.w3.org/2000/svg";
 
-const kSlack = 3200;  // metres by which the horizon is lower than the ellipsoid: what lies on ground there is not hidden too early
+const kSlack = 3200;  // metres; the horizon is that of an ellipsoid lower by this, so that no visible point is hidden
 
 // An ellipsoid whose radii are `metres` longer.
 export function raised({ radii: { x, y, z } }, metres) {

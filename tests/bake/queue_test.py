@@ -93,6 +93,8 @@ class Queue(QueueCase):
         place = self.place()
         # Beats come at a third of it, and must not be late on a loaded machine.
         lease = max(self.seconds / len(self.units) / 2, 0.3)
+        if lease > self.seconds / len(self.units):
+            self.skipTest("units take less than 0.3 s here")
         workers = [self.start(place, lease=round(lease, 3)) for _ in range(3)]
         outputs = [out for out, _ in self.end_all(workers)]
         self.assertEqual(self.baked(*outputs), sorted(self.units), f"a lease of {lease:.3f} s is shorter than a unit")

@@ -117,7 +117,7 @@ class Purge(unittest.TestCase):
             def load(client):
                 try:
                     load_until_stopped(client)
-                except OSError as error:  # else a_round would wait for ever
+                except (OSError, http.client.HTTPException) as error:  # else a_round would wait for ever
                     wrongs.append(error)
 
             def load_until_stopped(client):

@@ -169,7 +169,7 @@ describe('the viewer', () => {
     const other = sloped.filter((colour, i) => hue(colour).some((channel, k) => Math.abs(channel - hue(steep[i])[k]) > 6));
     assert.ok(other.length / steep.length < 0.1, `${other.length} of ${steep.length} pixels have another slope`);
     assert.ok(await page.evaluate(() => window.tried > 0 && terrace.globe.widget.useDefaultRenderLoop), 'it is still drawn');
-    assert.ok(await page.evaluate(() => window.shader.isDestroyed()), 'with its textures');
+    assert.ok(await page.evaluate(() => window.shader.isDestroyed()), 'the shader is destroyed with the tileset');
     assert.ok(await page.locator('#splitter').isHidden());
     assert.equal(await page.evaluate(() => terrace.globe.tiles3d.drawn().tiles), 0);
     await page.evaluate(() => {

@@ -430,7 +430,7 @@ TEST_F(Limits, LetsTheConfiguredPagesReadReplies) {
     EXPECT_EQ(refused.status, status);
     EXPECT_EQ(refused.Field("access-control-allow-origin"), "https://maps.example") << status;
   }
-  EXPECT_FALSE(Fetch(port(), target, page + page).fields.contains("access-control-allow-origin")) << "which one?";
+  EXPECT_FALSE(Fetch(port(), target, page + page).fields.contains("access-control-allow-origin")) << "two origins";
 }
 
 TEST_F(Limits, BelievesTrustedProxiesAlone) {

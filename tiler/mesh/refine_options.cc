@@ -128,9 +128,9 @@ tin::GreedyOptions RefineOptionsOf(const dem::ElevationModel& model, const proto
   const proto::EdgeErrors smallest(proto::kHeightResolution);
   tin::GreedyOptions options = BaseRefineOptions(samples, EdgeStepsOf(model, samples.key, smallest));
   dem::MeshDemands demands = dem::TileEdits(model).DemandsOf(samples.key);
-  // The outline of a hole is a chain of forced nodes. No edge of a Delaunay triangulation crosses a step of it, one
-  // cell or its diagonal, except the other diagonal where both are Delaunay; the data-dependent criterion would flip
-  // steps.
+  // The outline of a hole is a chain of forced nodes with steps of one cell or its diagonal. Edges of a Delaunay
+  // triangulation do not cross such steps, except where both diagonals of a cell are Delaunay. Edges that the
+  // data-dependent criterion prefers may.
   options.criterion = demands.no_triangles.empty() ? criterion : tin::Criterion::kDelaunay;
   options.limits = LimitsOf(std::move(demands));
   return options;

@@ -63,7 +63,7 @@ Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
     if (mesh_bytes_ > kMaxMeshBytes) {
       return MakeError(
           ErrorCode::kInvalidArgument,
-          "{}: the meshes of their tiles take more than {} MiB; ask for fewer tiles at once, or for a larger "
+          "{}: the meshes of their tiles take more than {} MiB; ask for a smaller part at once, or for a larger "
           "error",
           numbers_.subject(), kMaxMeshBytes >> 20);
     }

@@ -148,9 +148,9 @@ std::string ExplainEmptyText(const std::vector<std::string>& arguments) {
   const auto words = OtherWords();  // by the flags of the configuration
   for (std::size_t i = 1; i < arguments.size(); ++i) {
     const std::string& flag = arguments[i - 1];
-    if (!arguments[i].empty() || !flag.starts_with("--") || flag.find('=') != std::string::npos) continue;
+    if (!arguments[i].empty() || !IsFlag(flag) || flag.find('=') != std::string::npos) continue;
     if (flag == "--config" || !words.contains(flag)) {
-      return flag + " is followed by an empty text; leave it out, or set the variable that it comes from";
+      return "the argument after " + flag + " is empty; leave it out, or set the variable that it comes from";
     }
   }
   return {};

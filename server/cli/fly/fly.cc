@@ -82,8 +82,7 @@ int RunFly(const FlyArguments& arguments) {
       return Fail(writable.error());
     }
   }
-  std::signal(SIGINT, RequestStop);
-  std::signal(SIGTERM, RequestStop);
+  const auto interrupt_before = std::signal(SIGINT, RequestStop), terminate_before = std::signal(SIGTERM, RequestStop);
   fly::Statistics statistics(options->clients);
   std::FILE* const log = arguments.json ? stderr : stdout;
   fmt::print(log, "{}: {:.1f} km in {:.0f} s, {} client{}\n", options->document.PublicText(),
@@ -97,8 +96,8 @@ int RunFly(const FlyArguments& arguments) {
       statistics);
 
   // The reports may wait for the reader of a pipe.
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  std::signal(SIGINT, interrupt_before);
+  std::signal(SIGTERM, terminate_before);
   const fly::FlightRecord record = statistics.record();
   const fly::Summary summary = fly::Summarize(*options, record);
   const fly::Judgements judgements = fly::Judge(*requirements, summary);

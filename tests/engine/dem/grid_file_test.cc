@@ -16,7 +16,6 @@
 namespace terrace::dem {
 namespace {
 
-// GDAL writes such a system beside the file, where a reply has no place for it.
 // No other test of this program may use these codes: EpsgWkt keeps what it has found.
 TEST(OutputGrid, AFailureOfTheDatabaseIsNoUnknownCodeAndPasses) {
   rlimit limit{};
@@ -33,6 +32,7 @@ TEST(OutputGrid, AFailureOfTheDatabaseIsNoUnknownCodeAndPasses) {
   EXPECT_EQ(unknown.error().code, ErrorCode::kInvalidArgument);
 }
 
+// GDAL writes such a system beside the file, where a reply has no place for it.
 TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
   const GridRequest equal_earth{
       .epsg = 8857, .west = 1e6, .south = 5e6, .east = 1.2e6, .north = 5.2e6, .columns = 2, .rows = 2};

@@ -110,7 +110,7 @@ class Usage(unittest.TestCase):
                           ["mesh", "a.tif", "--out", "c.obj", "--bbox"], ["info", "a.tif", "--draw"], ["fly", "http://a/b", "--report"]):
             result = run(*arguments, "")
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
-            self.assertIn(f"terrace: {arguments[-1]} is followed by an empty text", result.stderr)
+            self.assertIn(f"terrace: the argument after {arguments[-1]} is empty; ", result.stderr)
         self.assertEqual(run("serve", "--cache-dir", "", "--print-config").returncode, 0, "an empty text is a value")
 
     def test_typos_are_told_with_the_nearest_name(self):
@@ -286,6 +286,7 @@ class Config(unittest.TestCase):
         out = self.folder / "first.obj"
         process = subprocess.Popen([*inside, "sh", "-c", 'exec "$0" "$@"', BINARY, "mesh", SOURCE_DIR / "config/samples/etopo5.tif", "--out", out, "--rms", "0"],
                                    stderr=subprocess.DEVNULL)
+        self.addCleanup(process.kill)
         until = time.monotonic() + 60
         while not list(out.parent.glob("first.obj.*.part")):
             self.assertLess(time.monotonic(), until)

@@ -195,7 +195,7 @@ TEST(HeadEnd, BoundsTheTargetAndTheHead) {
   const std::string fits(kMaxTargetBytes - 1, 'a');
   EXPECT_TRUE(ParseHead("GET /" + fits + " HTTP/1.1\r\nHost: x\r\n\r\n"));
   EXPECT_EQ(ParseHead("GET /" + fits + "a HTTP/1.1\r\nHost: x\r\n\r\n").error().status, 414);
-  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxTargetBytes + 100, 'a'), 0), 0u) << "its Origin may follow";
+  EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxTargetBytes + 100, 'a'), 0), 0u) << "a field Origin may follow";
   EXPECT_EQ(FindHeadEnd("GET /" + std::string(kMaxHeadBytes, 'a'), 0).error().status, 414);
   EXPECT_EQ(FindHeadEnd(Get("A: " + std::string(kMaxHeadBytes, 'b')), 0).error().status, 431);
   EXPECT_EQ(FindHeadEnd(Get("").substr(0, 20) + std::string(kMaxHeadBytes, 'b'), 0).error().status, 431);
