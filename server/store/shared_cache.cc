@@ -149,23 +149,23 @@ class SharedCache final : public tiler::TileStore {
 };
 
 Result<SharedStoreOptions> OptionsOf(const config::SharedCacheConfig& config, std::size_t readers) {
-  const auto wrong = [](std::string_view what) {
-    return MakeError(ErrorCode::kInvalidArgument, "shared_cache: {}", what);
+  const auto unreadable = [](std::string_view what) {
+    return MakeError(ErrorCode::kUnavailable, "shared_cache: {}", what);
   };
   Result<redis::Address> address = redis::ParseAddress(config.url);
-  if (!address) return wrong(address.error().message);
+  if (!address) return MakeError(ErrorCode::kInvalidArgument, "shared_cache: {}", address.error().message);
   if (!config.password_file.empty()) {
     std::ifstream file(config.password_file);
     if (!std::getline(file, address->password) || address->password.empty()) {
-      return wrong(fmt::format("{} cannot be read or is empty; it must have the password in its first line",
-                               config.password_file));
+      return unreadable(fmt::format("{} cannot be read or is empty; it must have the password in its first line",
+                                    config.password_file));
     }
   } else if (const char* const password = std::getenv(kSharedCachePassword);
              password != nullptr) {  // NOLINT(concurrency-mt-unsafe): read before threads start
     address->password = password;
   }
   if (!config.ca_file.empty() && !std::ifstream(config.ca_file)) {
-    return wrong(fmt::format("{} cannot be read; it must have certificates in PEM", config.ca_file));
+    return unreadable(fmt::format("{} cannot be read; it must have certificates in PEM", config.ca_file));
   }
   SharedStoreOptions options;
   options.address = *std::move(address);
