@@ -17,8 +17,8 @@ namespace terrace::server {
 // The variable of the environment with the password, if there is no file with it.
 inline constexpr const char* kSharedCachePassword = "TERRACE_SHARED_CACHE_PASSWORD";
 
-// Checks URL, password and certificates without connecting. kInvalidArgument: the message names the option, and has no
-// password.
+// Checks URL, password and certificates without connecting. kInvalidArgument: the URL is wrong. kUnavailable: a file
+// cannot be read. The message names the option, and has no password.
 Result<void> CheckSharedCache(const config::SharedCacheConfig& config);
 
 // `readers`: look-ups at a time. Returns at once: a Redis that cannot be reached is no error. Errors: as above.
