@@ -77,7 +77,7 @@ struct HandlerState {
   // Documents for requests without parameters.
   struct DatasetDocuments {
     Document layer;
-    Document tileset;  // null bodies: it is written for each request
+    Document tileset;                                           // null bodies: it is written for each request
     std::shared_ptr<const std::vector<proto::TreeRoot>> roots;  // of its implicit trees
   };
   const std::vector<DatasetDocuments> dataset_documents;  // by index

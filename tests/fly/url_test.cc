@@ -51,7 +51,8 @@ TEST(Url, HasAColonInTheHostOnlyInBrackets) {
 
 TEST(Url, IsShownWithoutSecrets) {
   const auto shown = [](const char* text) { return ParseUrl(text)->PublicText(); };
-  for (const char* plain : {"http://h/a", "http://h/a?error=5", "http://h/a?token=0123456789abcde&error=5&x", "http://h/?"}) {
+  for (const char* plain :
+       {"http://h/a", "http://h/a?error=5", "http://h/a?token=0123456789abcde&error=5&x", "http://h/?"}) {
     EXPECT_EQ(shown(plain), plain);
   }
   EXPECT_EQ(shown("http://h/a?token=0123456789abcdef"), "http://h/a?token=...");

@@ -209,7 +209,8 @@ void AddClientFlags(CLI::App& command, FlyArguments& a) {
   AddNumber(command, "--loads", a.loads, "N", 1, 1000, "Requests of a client at a time");
   AddNumber(command, "--cache", a.cache_mib, "MIB", 1, 65536, "Memory for the decoded tiles of one client");
   command.add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn");
-  command.add_option("--header", a.headers, "\"Name: value\" for each request to the server of URL; may be repeated")->type_name("HEADER");
+  command.add_option("--header", a.headers, "\"Name: value\" for each request to the server of URL; may be repeated")
+      ->type_name("HEADER");
   command.add_flag("--insecure", a.insecure, "Accept any TLS certificate");
   AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0,
             "Longest time of connecting to a resolved host, and from a request to its complete reply");
