@@ -101,6 +101,16 @@ class Fairness : public ServerFixture {
       EXPECT_TRUE(client.get() == &polite || StatusOf(*client) == 200);
     }
   }
+  // Of two workers, one is blocked in the first of `sent` long jobs, and the other one makes a tile.
+  void ExpectATileBesideOneOf(long sent) {
+    ASSERT_TRUE(Waiting(sent - 1));
+    ASSERT_TRUE(HaveBegun(1));
+    RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
+    ASSERT_TRUE(HaveBegun(2));
+    EXPECT_EQ(Begun()[1], "0/0/0");
+    LetAllGo();
+    EXPECT_EQ(StatusOf(polite), 200);
+  }
   static std::string Tile(int i) {
     return "/maui/3/" + std::to_string(i % 16) + "/" + std::to_string(i / 16 % 8) +
            ".terrain?fraction=" + std::to_string(0.05 * (1 << (i / 128)));
@@ -199,26 +209,14 @@ TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
   const std::string post = "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n" +
                            From("192.0.2.1") + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
   for (int i = 0; i < 4; ++i) Send(post);
-  ASSERT_TRUE(Waiting(3));
-  ASSERT_TRUE(HaveBegun(1));
-  RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
-  ASSERT_TRUE(HaveBegun(2));
-  EXPECT_EQ(Begun()[1], "0/0/0");
-  LetAllGo();
-  EXPECT_EQ(StatusOf(polite), 200);
+  ExpectATileBesideOneOf(4);
 }
 
 TEST_F(Fairness, LongRaysLeaveAWorkerForTiles) {
   StartHeld();
   const std::string ray = "/maui/sight?heights=ground&rays=1,7,2,3,7,2";  // 200 km
   for (int i = 0; i < 4; ++i) Send(Get(ray, From("192.0.2.1")));
-  ASSERT_TRUE(Waiting(3));
-  ASSERT_TRUE(HaveBegun(1));
-  RawClient& polite = Send(Get("/maui/0/0/0.terrain", From("192.0.2.2")));
-  ASSERT_TRUE(HaveBegun(2));
-  EXPECT_EQ(Begun()[1], "0/0/0");
-  LetAllGo();
-  EXPECT_EQ(StatusOf(polite), 200);
+  ExpectATileBesideOneOf(4);
 }
 
 class Uploads : public Fairness {
