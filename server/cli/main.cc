@@ -58,7 +58,8 @@ int Run(int argc, char** argv) {
     arguments.erase(arguments.begin());
     arguments.emplace_back("--help");
   }
-  if (const std::string empty = ExplainEmptyText(arguments); !empty.empty()) return Fail(empty, kExitUsage);
+  if (const std::string missing = ExplainMissingValue(app, arguments); !missing.empty())
+    return Fail(missing, kExitUsage);
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11 expects them in reverse order
   try {
     app.parse(std::move(reversed));

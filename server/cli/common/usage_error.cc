@@ -144,14 +144,25 @@ std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
   return what;
 }
 
-std::string ExplainEmptyText(const std::vector<std::string>& arguments) {
+std::string ExplainMissingValue(const CLI::App& program, const std::vector<std::string>& arguments) {
+  const CLI::App* command = &program;
   const auto words = OtherWords();  // by the flags of the configuration
-  for (std::size_t i = 1; i < arguments.size(); ++i) {
-    const std::string& flag = arguments[i - 1];
-    if (!arguments[i].empty() || !IsFlag(flag) || flag.find('=') != std::string::npos) continue;
-    if (flag == "--config" || !words.contains(flag)) {
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& flag = arguments[i];
+    const auto named = command->get_subcommands([&](const CLI::App* of) { return of->get_name() == flag; });
+    if (!named.empty()) command = named.front();
+    if (!IsFlag(flag) || i + 1 == arguments.size()) continue;
+    const CLI::Option* const option = command->get_option_no_throw(flag);
+    if (option == nullptr || option->get_items_expected_max() == 0) continue;
+    const std::string& value = arguments[i + 1];
+    if (value.empty() && (flag == "--config" || !words.contains(flag))) {
       return "the argument after " + flag + " is empty; leave it out, or set the variable that it comes from";
     }
+    const std::string name = value.substr(0, value.find('='));
+    if (IsFlag(value) && command->get_option_no_throw(name) != nullptr) {
+      return fmt::format("{} needs a value: {}; the option {} follows", flag, WithValue(*option, flag), name);
+    }
+    ++i;  // a value may look like a flag
   }
   return {};
 }

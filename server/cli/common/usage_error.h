@@ -19,8 +19,8 @@ bool HasUnknownCommand(const CLI::App& program, const std::vector<std::string>& 
 std::string ExplainUsage(const CLI::App& program, const CLI::ParseError& error,
                          const std::vector<std::string>& arguments);
 
-// Returns what is wrong with an option that is given an empty text, which commands take for an option that is not
-// given; empty: nothing. Options of the configuration decide themselves, because some may be empty.
-std::string ExplainEmptyText(const std::vector<std::string>& arguments);
+// Returns what is wrong with an option whose value is an empty text or another option, as if a script's variable is not
+// set; empty: nothing. The parser takes both as values. Empty texts of options of the configuration are left to them.
+std::string ExplainMissingValue(const CLI::App& program, const std::vector<std::string>& arguments);
 
 }  // namespace terrace::cli

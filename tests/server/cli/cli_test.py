@@ -112,6 +112,16 @@ class Usage(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
             self.assertIn(f"terrace: the argument after {arguments[-1]} is empty; ", result.stderr)
         self.assertEqual(run("serve", "--cache-dir", "", "--print-config").returncode, 0, "an empty text is a value")
+        self.assertNotIn("after --check-config", run("serve", "--check-config", "").stderr, "an option without a value")
+
+    def test_an_option_is_no_value(self):
+        for arguments, message in ((["bake", "a.tif", "--out", "--no-gzip"], "--out needs a value: --out PLACE; the option --no-gzip follows"),
+                                   (["serve", "a.tif", "--listen", "--compact=true"], "--listen needs a value: --listen HOST:PORT; the option --compact follows"),
+                                   (["bake", "status", "--queue", "--job", "a"], "--queue needs a value")):
+            result = run(*arguments)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
+            self.assertIn(f"terrace: {message}", result.stderr)
+        self.assertEqual(run("serve", "a.tif", "--floor", "-5", "--print-config").returncode, 0)
 
     def test_typos_are_told_with_the_nearest_name(self):
         for arguments, word, nearest in ((["serv"], "command serv", "serve"), (["--versoin"], "option --versoin", "--version"),
