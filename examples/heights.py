@@ -54,7 +54,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--server", default="http://127.0.0.1:8080")
     parser.add_argument("--dataset", help="the first that the server has")
-    parser.add_argument("places", nargs="*", metavar="LAT,LON", help="the middle of the dataset")
+    parser.add_argument("places", nargs="*", metavar="LAT,LON", help="the middle of the dataset; -- precedes a place that begins with a minus")
     arguments = parser.parse_args()
 
     datasets = {dataset["name"]: dataset for dataset in json.loads(fetch(f"{arguments.server}/datasets")[0])["datasets"]}
@@ -65,7 +65,7 @@ def main():
         sys.exit(f"{arguments.server} has no dataset {name}; it has {', '.join(datasets)}")
     west, south, east, north = datasets[name]["bounds"]
     middle = (west + east + 360 * (west > east)) / 2  # across the antimeridian west is above east
-    places = arguments.places or [f"{(south + north) / 2},{middle - 360 * (middle > 180)}"]
+    places = [place.replace(" ", "") for place in arguments.places] or [f"{(south + north) / 2:.6f},{middle - 360 * (middle > 180):.6f}"]
 
     reply, _ = fetch(f"{arguments.server}/{name}/heights?certify=deepest&locations={'|'.join(places)}")
     for result in json.loads(reply)["results"]:
