@@ -91,10 +91,7 @@ class Queue(QueueCase):
     @in_parallel.alone
     def test_a_slow_unit_is_not_inherited_while_its_worker_lives(self):
         place = self.place()
-        # Beats come at a third of it, and must not be late on a loaded machine.
-        lease = max(self.seconds / len(self.units) / 2, 0.3)
-        if lease > self.seconds / len(self.units):
-            self.skipTest("units take less than 0.3 s here")
+        lease = self.seconds / len(self.units) / 2
         workers = [self.start(place, lease=round(lease, 3)) for _ in range(3)]
         outputs = [out for out, _ in self.end_all(workers)]
         self.assertEqual(self.baked(*outputs), sorted(self.units), f"a lease of {lease:.3f} s is shorter than a unit")
