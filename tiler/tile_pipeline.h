@@ -60,7 +60,8 @@ class TilePipeline {
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
-  // The normals at points of the sources' surface: unit vectors east, north, up; NaN where it has none.
+  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up; NaN where ReadPoints
+  // returns NaN. Errors: those of ReadPoints.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;

@@ -38,9 +38,9 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
-// convert them to the ellipsoid and back, which may change them by millimetres. They are returned unchanged if the
-// heights of all sources that the edit touches are returned in the edit's datum. For kSource, the floor must be
-// returned in that datum too.
+// return them unchanged if they return the heights of all sources that the edit touches, and for kSource also the
+// floor, in the edit's datum. Otherwise they convert them to the ellipsoid and back, which may change them by
+// millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid

@@ -38,9 +38,9 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
-  // of a file are missing. If other files have other errors as well: without DemOptions::fault, the first of these
-  // errors is returned instead; with it, DemOptions::fault is called with each of them, and kCancelled is returned.
+  // are opened as by Open, which may take long. Errors: those of Open. kCancelled also means that the cache lacks
+  // statistics of a file. A file may lack statistics while another file has an error of Open: with DemOptions::fault,
+  // that function gets the error, and kCancelled is returned; without it, the error is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 

@@ -11,6 +11,8 @@
 
 namespace terrace::tiler {
 
+// What the x, y and z of a vertex are. OBJ and PLY files store them directly. glTF is y-up: in a GLB file, the vertex
+// is at (x, z, -y) after the matrix of its node is applied.
 enum class AreaCoordinates : std::uint8_t {
   kEnu,        // metres east, north and up of the area's centre on the ellipsoid
   kEcef,       // EPSG:4978

@@ -12,15 +12,17 @@ enum class SlopeStyle : std::uint8_t {
   kDegrees,  // grey: twice the slope in degrees
 };
 
-// Members that a format does not use have their defaults.
+// Members that a TileFormat does not use have their defaults.
 struct MapParameters {
-  proto::PictureFormat picture = proto::PictureFormat::kPng;  // hillshades and slopes: not kJpeg
-  std::uint16_t azimuth_deg = 315;          // where the light comes from, clockwise from north, 0 .. 359
-  std::uint8_t altitude_deg = 45;           // of the light above the horizon, 0 .. 90
-  std::uint16_t z_factor_hundredths = 100;  // heights are multiplied by it, 1 .. 10000
-  SlopeStyle slope_style = SlopeStyle::kColors;
-  // Between contours; requests for contours must set it. The encoder multiplies it by 5 until the tile has few enough
-  // points.
+  // Not kContours. kHillshade and kSlope: not kJpeg.
+  proto::PictureFormat picture = proto::PictureFormat::kPng;
+  // kHillshade only.
+  std::uint16_t azimuth_deg = 315;               // where the light comes from, clockwise from north, 0 .. 359
+  std::uint8_t altitude_deg = 45;                // of the light above the horizon, 0 .. 90
+  std::uint16_t z_factor_hundredths = 100;       // heights are multiplied by it, 1 .. 10000
+  SlopeStyle slope_style = SlopeStyle::kColors;  // kSlope only
+  // kContours only: between contours; requests must set it. The encoder multiplies it by 5 until the tile has few
+  // enough points.
   std::uint32_t interval_cm = 0;
 
   friend bool operator==(const MapParameters&, const MapParameters&) = default;

@@ -70,7 +70,8 @@ class StoreBase {
   // Returns when everything that was inserted before the call is written or dropped.
   virtual void Flush() {}
 
-  // Drops values that wait to be written, and accepts no more. For a process that must end at once.
+  // Drops values that wait to be written, and accepts no more. For a process that must end at once. TileTiers calls
+  // neither Flush nor Abandon, also not when it is destroyed.
   virtual void Abandon() = 0;
 };
 

@@ -38,7 +38,7 @@ class TileTiers {
             HeaderWriter write_header_lines = nullptr);
   ~TileTiers();
 
-  // The tier in memory: the only one that is asked without blocking.
+  // The tier in memory, for the server, which looks there without blocking. FindOrBuild looks there first.
   TileCache& memory() { return *memory_; }
   const TileCache& memory() const { return *memory_; }
 

@@ -9,8 +9,8 @@
 
 namespace terrace::tiler {
 
-// Heights of a dataset at points. NaN in holes that edits cut. Where the sources have no height: NaN in heights of the
-// sources, the floor in heights of a drawn surface.
+// Heights of a dataset at points. NaN in holes that edits cut. Where neither a source nor an edit has a height: NaN in
+// heights of the sources (ElevationModel::ReadPoints), the floor in heights of a drawn surface.
 struct PointHeights {
   std::vector<float> heights;
   std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty for a drawn surface

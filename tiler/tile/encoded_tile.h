@@ -43,6 +43,7 @@ struct EncodedTile {
   // The Terrain-Certified-Error header, metres: an upper bound of the distance to every sample of the sources, each
   // after the edits that apply to that sample. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.
   std::optional<double> certified_error_m = {};
+  // Of the encoded mesh; in GLB tiles with the skirts. Formats without a mesh: 0.
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build

@@ -36,10 +36,12 @@ constexpr bool IsMapLayer(TileFormat format) { return format > TileFormat::kHeig
 // Pixels along an edge of a height tile or of a picture for maps; the first is the default.
 inline constexpr std::array<int, 2> kSidesPx = {256, 512};
 
+// Members that the format does not use must have their defaults; otherwise caches keep the tile more than once.
 struct TileRequest {
   std::uint32_t dataset = 0;  // index into TilePipeline::datasets()
   geo::TileKey key;
-  int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
+  // kQuantizedMesh and kGlb only: on the ladder of the key's level, kCoarsestStep .. kFinestStep (geo/error_ladder.h).
+  int error_step = 0;
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
   proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only; no effect without an image
