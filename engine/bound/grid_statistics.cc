@@ -101,7 +101,7 @@ float GridStatistics::ErrorOfAverages(double west, double north, double east, do
   if (factor == 1) return 0;  // averages of one sample
   const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics, double shift) {
     const auto x = static_cast<double>(member.column) - shift, y = static_cast<double>(member.row);
-    const StatisticsPages::Statistics read = statistics == nullptr ? member.raster->statistics() : nullptr;
+    const StatisticsPtr read = statistics == nullptr ? member.raster->statistics() : nullptr;
     return (statistics != nullptr ? *statistics : *read)
         .errors.Largest(factor, west - x, north - y, east - x, south - y);
   };

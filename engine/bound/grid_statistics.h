@@ -42,7 +42,7 @@ class GridStatistics {
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;
-  std::vector<StatisticsPages::Statistics> statistics_;  // of near_, if they are few; else empty
+  std::vector<StatisticsPtr> statistics_;  // of near_, if they are few; else empty
   Position misplacement_{0, 0};
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <list>
 #include <memory>
@@ -12,7 +13,7 @@
 namespace terrace::dem {
 
 // Blocks by key, up to a number of bytes; the least recently used ones are dropped first. Thread-safe.
-template <typename Key, typename Block, typename Hash>
+template <typename Key, typename Block, typename Hash = std::hash<Key>>
 class LruBlockCache {
  public:
   using BlockPtr = std::shared_ptr<const Block>;
@@ -27,19 +28,21 @@ class LruBlockCache {
     return found->second->block;
   }
 
-  // `bytes`: of the block and its entry. A block of more than the capacity is not kept.
+  // `bytes`: of the block and its entry. A block of more than the capacity is kept until the next is inserted.
   void Insert(const Key& key, BlockPtr block, std::size_t bytes) {
     std::list<Entry> gone;  // freed after the lock is released
     const std::lock_guard lock(mutex_);
-    if (index_.contains(key) || bytes > capacity_bytes_) return;
+    if (index_.contains(key)) return;
     bytes_ += bytes;
     entries_.push_front({key, std::move(block), bytes});
     index_.emplace(key, entries_.begin());
-    while (bytes_ > capacity_bytes_) {
-      bytes_ -= entries_.back().bytes;
-      index_.erase(entries_.back().key);
-      gone.splice(gone.end(), entries_, std::prev(entries_.end()));
-    }
+    while (bytes_ > capacity_bytes_ && entries_.size() > 1) Remove(std::prev(entries_.end()), gone);
+  }
+
+  void Erase(const Key& key) {
+    std::list<Entry> gone;
+    const std::lock_guard lock(mutex_);
+    if (const auto found = index_.find(key); found != index_.end()) Remove(found->second, gone);
   }
 
   std::size_t count() const {
@@ -57,6 +60,13 @@ class LruBlockCache {
     BlockPtr block;
     std::size_t bytes;
   };
+
+  // Moves an entry to `gone`.
+  void Remove(typename std::list<Entry>::iterator entry, std::list<Entry>& gone) {
+    bytes_ -= entry->bytes;
+    index_.erase(entry->key);
+    gone.splice(gone.end(), entries_, entry);
+  }
 
   const std::size_t capacity_bytes_;
   mutable std::mutex mutex_;

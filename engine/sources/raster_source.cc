@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -266,49 +265,8 @@ std::string RasterSource::DescribeLackOfHeights() const {
   return terrace::dem::DescribeLackOfHeights(layout_.rules, info_.path);
 }
 
-bool StatisticsPages::Admit(std::size_t bytes) {
-  const std::lock_guard lock(mutex_);
-  if (bytes > kept_left_) return false;
-  kept_left_ -= bytes;
-  return true;
-}
-
-StatisticsPages::Statistics StatisticsPages::Find(const void* raster) {
-  const std::lock_guard lock(mutex_);
-  const auto found = by_raster_.find(raster);
-  if (found == by_raster_.end()) return nullptr;
-  pages_.splice(pages_.begin(), pages_, found->second);
-  return found->second->statistics;
-}
-
-void StatisticsPages::Add(const void* raster, Statistics statistics) {
-  const std::size_t bytes = statistics->bytes();
-  const std::lock_guard lock(mutex_);
-  if (by_raster_.contains(raster)) return;  // by another thread meanwhile
-  pages_.push_front({raster, std::move(statistics), bytes});
-  by_raster_.emplace(raster, pages_.begin());
-  paged_ += bytes;
-  while (paged_ > max_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
-}
-
-void StatisticsPages::Forget(const void* raster) {
-  const std::lock_guard lock(mutex_);
-  if (const auto found = by_raster_.find(raster); found != by_raster_.end()) Remove(found->second);
-}
-
-std::size_t StatisticsPages::paged_bytes() const {
-  const std::lock_guard lock(mutex_);
-  return paged_;
-}
-
-void StatisticsPages::Remove(std::list<Page>::iterator page) {
-  paged_ -= page->bytes;
-  by_raster_.erase(page->raster);
-  pages_.erase(page);
-}
-
 RasterSource::~RasterSource() {
-  if (paging_) paging_->pages->Forget(this);
+  if (paging_) paging_->pages->paged.Erase(this);
 }
 
 // In a dataset of thousands of rasters, the statistics take most of the memory.
@@ -319,7 +277,7 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
   content_ = statistics.content;
   edge_row_means_ = statistics.edge_row_means;
   rim_voids_ = std::move(statistics.rim_voids);
-  if (pages == nullptr || prepared.cache_file.empty() || pages->Admit(statistics.bytes())) {
+  if (pages == nullptr || prepared.cache_file.empty() || pages->kept.Take(statistics.bytes())) {
     kept_ = std::make_shared<const RasterStatistics>(std::move(statistics));
     return;
   }
@@ -331,13 +289,13 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
                                                   {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
 }
 
-StatisticsPages::Statistics RasterSource::statistics() const {
+StatisticsPtr RasterSource::statistics() const {
   if (kept_) return kept_;
-  if (auto known = paging_->pages->Find(this)) return known;
+  if (auto known = paging_->pages->paged.Find(this)) return known;
   auto statistics = ReadStatistics();
   if (!statistics) throw std::runtime_error(statistics.error().message);
   auto shared = std::make_shared<const RasterStatistics>(*std::move(statistics));
-  paging_->pages->Add(this, shared);
+  paging_->pages->paged.Insert(this, shared, shared->bytes());
   return shared;
 }
 
@@ -377,8 +335,7 @@ Result<std::vector<float>> RasterSource::ReadAverages(int factor, const GridWind
   // Uses memory and the cache file only if the files have not changed since they were prepared.
   if (factor >= kLargestMeasuredFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    if (const StatisticsPages::Statistics known = statistics(); known->coarse.Has(factor))
-      return known->coarse.Read(factor, window);
+    if (const StatisticsPtr known = statistics(); known->coarse.Has(factor)) return known->coarse.Read(factor, window);
   }
   if (memory_averages_ && memory_averages_->Has(factor)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());

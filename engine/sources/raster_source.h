@@ -6,16 +6,14 @@
 #include <atomic>
 #include <cstddef>
 #include <functional>
-#include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "engine/common/dem_types.h"
+#include "engine/common/lru_block_cache.h"
 #include "engine/core/result.h"
 #include "engine/crs/footprint.h"
 #include "engine/crs/georeference.h"
@@ -24,45 +22,20 @@
 #include "engine/gdal/handle_pool.h"
 #include "engine/raster/raster_layout.h"
 #include "engine/sources/prepare.h"
+#include "engine/statistics/averages_budget.h"
 #include "engine/statistics/raster_statistics.h"
 
 namespace terrace::dem {
 
-// Memory budget for the statistics of a dataset's rasters. Statistics beyond it are read from the statistics cache on
-// demand.
-//
-// Two budgets of bytes: for statistics that stay in memory with their raster, and for statistics that are paged,
-// evicted least recently used first. Thread-safe.
-class StatisticsPages {
- public:
-  using Statistics = std::shared_ptr<const RasterStatistics>;
+using StatisticsPtr = std::shared_ptr<const RasterStatistics>;
 
-  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), max_paged_(paged_bytes) {}
+// Memory for the statistics of a dataset's rasters. Those that fit `kept` stay in memory with their raster; the others
+// are read from the statistics cache on demand, and paged. Thread-safe.
+struct StatisticsPages {
+  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept(kept_bytes), paged(paged_bytes) {}
 
-  // Whether statistics of this size fit the first budget. If so, they are charged to it.
-  bool Admit(std::size_t bytes);
-
-  // Null: not in memory.
-  Statistics Find(const void* raster);
-  void Add(const void* raster, Statistics statistics);
-  void Forget(const void* raster);
-
-  std::size_t paged_bytes() const;
-
- private:
-  struct Page {
-    const void* raster;
-    Statistics statistics;
-    std::size_t bytes;
-  };
-  void Remove(std::list<Page>::iterator page);
-
-  mutable std::mutex mutex_;
-  std::size_t kept_left_;  // guarded by mutex_, as are the next members
-  const std::size_t max_paged_;
-  std::size_t paged_ = 0;
-  std::list<Page> pages_;  // most recently used first
-  std::unordered_map<const void*, std::list<Page>::iterator> by_raster_;
+  AveragesBudget kept;                                 // bytes
+  LruBlockCache<const void*, RasterStatistics> paged;  // by raster
 };
 
 class RasterSource {
@@ -97,7 +70,7 @@ class RasterSource {
 
   // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
   // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
-  StatisticsPages::Statistics statistics() const;
+  StatisticsPtr statistics() const;
   // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
@@ -142,7 +115,7 @@ class RasterSource {
   ContentHash content_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
-  StatisticsPages::Statistics kept_;  // null: the statistics are paged
+  StatisticsPtr kept_;  // null: the statistics are paged
   // Set if the statistics are paged.
   struct Paging {
     std::shared_ptr<StatisticsPages> pages;

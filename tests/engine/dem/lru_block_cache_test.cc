@@ -2,13 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <memory>
 
 namespace terrace::dem {
 namespace {
 
-using Blocks = LruBlockCache<int, int, std::hash<int>>;
+using Blocks = LruBlockCache<int, int>;
 
 TEST(LruBlockCache, TheLeastRecentlyUsedOnesAreDropped) {
   Blocks blocks(30);
@@ -29,11 +28,25 @@ TEST(LruBlockCache, TheFirstBlockOfAKeyStays) {
   EXPECT_EQ(blocks.bytes(), 10U);
 }
 
-TEST(LruBlockCache, ABlockOfMoreThanTheCapacityIsNotKept) {
+TEST(LruBlockCache, ABlockOfMoreThanTheCapacityIsKeptAlone) {
   Blocks blocks(30);
   blocks.Insert(1, std::make_shared<int>(10), 10);
   blocks.Insert(2, std::make_shared<int>(20), 31);
+  EXPECT_EQ(blocks.Find(1), nullptr);
+  EXPECT_NE(blocks.Find(2), nullptr);
+  blocks.Insert(3, std::make_shared<int>(30), 10);
   EXPECT_EQ(blocks.Find(2), nullptr);
+  EXPECT_EQ(blocks.bytes(), 10U);
+}
+
+TEST(LruBlockCache, AnErasedBlockIsGoneAndDoesNotCount) {
+  Blocks blocks(30);
+  for (int key = 1; key <= 3; ++key) blocks.Insert(key, std::make_shared<int>(key), 10);
+  blocks.Erase(2);
+  blocks.Erase(7);
+  EXPECT_EQ(blocks.Find(2), nullptr);
+  EXPECT_EQ(blocks.bytes(), 20U);
+  blocks.Insert(4, std::make_shared<int>(4), 10);
   EXPECT_NE(blocks.Find(1), nullptr);
 }
 

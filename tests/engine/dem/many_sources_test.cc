@@ -246,7 +246,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   auto opened = RasterSource::Open(path, {}, CacheIn(cache.path().string()), {}, {}, pages);
   ASSERT_TRUE(opened.has_value()) << opened.error().message;
   const RasterSource& paged = **opened;
-  EXPECT_EQ(pages->paged_bytes(), 0U) << "nothing was asked for yet";
+  EXPECT_EQ(pages->paged.bytes(), 0U) << "nothing was asked for yet";
   std::mt19937 random(3);
   const auto pick = [&random](int count) { return static_cast<double>(random() % static_cast<unsigned>(count)); };
   for (int i = 0; i < 300; ++i) {
@@ -261,7 +261,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
                 paged.statistics()->errors.Largest(factor, west, north, west + size, north + size));
     }
   }
-  EXPECT_GT(pages->paged_bytes(), 0U);
+  EXPECT_GT(pages->paged.bytes(), 0U);
   EXPECT_EQ(kept->ReadAverages(64, {3, 4, 5, 6}, {}).value(), paged.ReadAverages(64, {3, 4, 5, 6}, {}).value());
 }
 
@@ -305,7 +305,7 @@ TEST(ManySources, PagedTablesOfALostFileAreMadeAgain) {
   ASSERT_TRUE(opened.has_value());
   const RasterSource& raster = **opened;
   const auto drop = [&] {
-    pages->Forget(&raster);
+    pages->paged.Erase(&raster);
     for (const auto& entry : std::filesystem::directory_iterator(cache.path())) std::filesystem::remove(entry.path());
   };
   const float highest = raster.RangeIn(10, 10, 20, 20).max;
@@ -315,27 +315,6 @@ TEST(ManySources, PagedTablesOfALostFileAreMadeAgain) {
   drop();
   std::filesystem::remove(path);
   EXPECT_THROW(raster.RangeIn(10, 10, 20, 20), std::runtime_error) << "no bound is better than a wrong one";
-}
-
-TEST(ManySources, PagesGoThatWereUsedLongestAgo) {
-  const auto tables = [] {
-    RasterStatistics statistics;
-    statistics.table = RangeTable(1000, 1000);
-    statistics.table.Finish();
-    return std::make_shared<const RasterStatistics>(std::move(statistics));
-  };
-  const std::size_t bytes = tables()->bytes();
-  StatisticsPages pages(0, 2 * bytes);
-  const int a = 0, b = 0, c = 0;
-  pages.Add(&a, tables());
-  pages.Add(&b, tables());
-  EXPECT_NE(pages.Find(&a), nullptr);
-  pages.Add(&c, tables());
-  EXPECT_NE(pages.Find(&a), nullptr);
-  EXPECT_EQ(pages.Find(&b), nullptr);
-  EXPECT_EQ(pages.paged_bytes(), 2 * bytes);
-  pages.Forget(&a);
-  EXPECT_EQ(pages.paged_bytes(), bytes);
 }
 
 TEST(ManySources, SourcesOfOneProjectionShareItsOperation) {
