@@ -62,6 +62,7 @@ struct CellCentres {
   double Latitude(std::int64_t row) const { return halves.Latitude(2 * row + 1); }
   double StepDegrees() const { return 2 * halves.StepDegrees(); }
   std::int64_t rows() const { return halves.rows() / 2; }
+  bool IsPoleRow(std::int64_t /*row*/) const { return false; }
 
   geo::Lattice halves;
 };
@@ -121,7 +122,8 @@ class GridNodes {
 
   void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
     for (std::int64_t r = row; r < row + rows; ++r) {
-      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
+      const double latitude = grid_.Latitude(r);
+      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = {grid_.Longitude(c), latitude};
       georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
     }
   }
@@ -232,7 +234,7 @@ class GridNodes {
 
   void FillPoleRows() {
     for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
-      if (!IsPoleRow(grid_, row)) continue;
+      if (!grid_.IsPoleRow(row)) continue;
       Position pole{0, grid_.Latitude(row)};
       georeference_.ToPixels({&pole, 1});
       std::fill_n(At(window_.column, row), window_.columns, pole);
@@ -260,20 +262,15 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
   return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
 }
 
-template <typename Grid>
-NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint, const geo::NodeGrid& grid,
                                 const NodeWindow& window, double tolerance) {
   return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
 }
-template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::Lattice&, const NodeWindow&,
-                                         double);
-template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::MercatorGrid&,
-                                         const NodeWindow&, double);
 
 std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
                                           const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
-  const NodePositions found = NodePositions::Of(georeference, footprint, CellCentres(lattice), window, tolerance);
+  const NodePositions found = GridNodes(georeference, footprint, CellCentres(lattice), window, tolerance).Compute();
   std::vector<Position> centres;
   centres.reserve(found.columns() * found.rows());
   for (std::size_t j = 0; j < found.rows(); ++j) {

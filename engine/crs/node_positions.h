@@ -12,21 +12,13 @@
 #include "engine/crs/footprint.h"
 #include "engine/crs/georeference.h"
 #include "engine/geo/lattice.h"
-#include "engine/geo/mercator_grid.h"
+#include "engine/geo/node_grid.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
 
 // The position of nodes that a raster's CRS cannot represent: NaN.
 inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
-
-// Whether a row lies on a pole or beyond it: all its nodes share one position. Grids other than lattices have no such
-// rows.
-inline bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
-template <typename Grid>
-bool IsPoleRow(const Grid&, std::int64_t) {
-  return false;
-}
 
 // The largest error of a node's position. Unit: the spacing of the averages in use, `factor` pixels. Affine positions
 // are exact but for rounding. Others are interpolated with a tolerance of 1e-5 of this spacing, which is checked at a
@@ -49,10 +41,8 @@ class NodePositions {
       : window_(window), x_(std::move(x)), y_(std::move(y)) {}
   NodePositions(const NodeWindow& window, std::vector<Position> nodes) : window_(window), nodes_(std::move(nodes)) {}
   // Positions of lattice nodes. NaN where the source's CRS has no position, and outside `footprint`. The nodes of a
-  // pole row share one position unless columns are meridians. `Grid`: geo::Lattice, or geo::MercatorGrid of pixel
-  // centres.
-  template <typename Grid>
-  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
+  // pole row share one position unless columns are meridians.
+  static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::NodeGrid& grid,
                           const NodeWindow& window, double tolerance);
 
   const NodeWindow& window() const { return window_; }

@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "engine/crs/node_positions.h"
-
 namespace terrace::dem {
 namespace {
 
@@ -24,12 +22,11 @@ int BoxesAlong(double degrees, double finest_cell) {
 }
 
 // One global cell of nodes, filled from its corners inwards. Every node is evaluated at most once.
-template <typename Grid>
 class NodeCell {
  public:
   static constexpr int kSize = 32;  // divides the columns and rows of every grid
 
-  NodeCell(const Geoid::Reader& geoid, double finest_cell, const Grid& grid)
+  NodeCell(const Geoid::Reader& geoid, double finest_cell, const geo::NodeGrid& grid)
       : geoid_(geoid), largest_(finest_cell / grid.StepDegrees()), grid_(grid) {}
 
   // The cell whose south-western (for Web Mercator: north-western) node is (column, row). It owns the nodes 0 .. kSize
@@ -94,7 +91,7 @@ class NodeCell {
 
   const Geoid::Reader& geoid_;
   const double largest_;  // nodes along the side of a cell that may be interpolated
-  const Grid& grid_;
+  const geo::NodeGrid& grid_;
   std::int64_t column_ = 0, row_ = 0;
   std::array<double, std::size_t{kStride} * kStride> known_{}, filled_{};
   std::array<bool, std::size_t{kStride} * kStride> is_known_{};
@@ -300,8 +297,8 @@ HeightRange Undulations::RangeOf(double west, double south, double width, double
 }
 
 // From the grid's nodes, in strips of rows.
-template <typename Grid>
-Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
+Result<void> Undulations::Interpolate(const geo::NodeGrid& grid, const NodeWindow& window,
+                                      std::vector<double>& out) const {
   constexpr std::int64_t kMaxNodes = 1 << 18;
   const UndulationGrid& nodes = *geoid_->grid();
   std::vector<AxisPosition> columns, rows;
@@ -332,14 +329,13 @@ Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window
   return {};
 }
 
-template <typename Grid>
-void Undulations::Evaluate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
-  constexpr int kCell = NodeCell<Grid>::kSize;
+void Undulations::Evaluate(const geo::NodeGrid& grid, const NodeWindow& window, std::vector<double>& out) const {
+  constexpr int kCell = NodeCell::kSize;
   const auto at = [&](std::int64_t column, std::int64_t row) -> double& {
     return out[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
   };
   const Geoid::Reader geoid(*geoid_);
-  NodeCell<Grid> cell(geoid, geoid_->finest_cell(), grid);
+  NodeCell cell(geoid, geoid_->finest_cell(), grid);
   const std::int64_t east = window.column + window.columns, end = window.row + window.rows;
   const auto floor_cell = [](std::int64_t node) { return node - FloorMod(node, kCell); };
   for (std::int64_t row = floor_cell(std::max<std::int64_t>(window.row, 0)); row < std::min(end, grid.rows());
@@ -357,10 +353,11 @@ void Undulations::Evaluate(const Grid& grid, const NodeWindow& window, std::vect
     }
   }
   for (std::int64_t row = window.row; row < end; ++row) {
+    const double latitude = grid.Latitude(row);
     for (std::int64_t column = window.column; column < east; ++column) {
       double& value = at(column, row);
       if (std::isnan(value)) continue;
-      const double longitude = grid.Longitude(FloorMod(column, grid.columns())), latitude = grid.Latitude(row);
+      const double longitude = grid.Longitude(FloorMod(column, grid.columns()));
       if (!IsInside(longitude, latitude)) {
         value = kUnknownUndulation;
       } else if (!boxes_.empty()) {
@@ -371,8 +368,7 @@ void Undulations::Evaluate(const Grid& grid, const NodeWindow& window, std::vect
   }
 }
 
-template <typename Grid>
-Result<std::vector<double>> Undulations::At(const Grid& grid, const NodeWindow& window) const {
+Result<std::vector<double>> Undulations::At(const geo::NodeGrid& grid, const NodeWindow& window) const {
   std::vector<double> out(Area(window.columns, window.rows), kUnknownUndulation);
   if (geoid_->grid() == nullptr) {
     Evaluate(grid, window, out);
@@ -380,14 +376,11 @@ Result<std::vector<double>> Undulations::At(const Grid& grid, const NodeWindow& 
     return tl::unexpected(done.error());
   }
   for (int row = 0; row < window.rows; ++row) {
-    if (!IsPoleRow(grid, window.row + row)) continue;
+    if (!grid.IsPoleRow(window.row + row)) continue;
     std::fill_n(out.begin() + std::ptrdiff_t{row} * window.columns, window.columns,
                 poles_[window.row + row <= 0 ? 0 : 1]);
   }
   return out;
 }
-
-template Result<std::vector<double>> Undulations::At(const geo::Lattice&, const NodeWindow&) const;
-template Result<std::vector<double>> Undulations::At(const geo::MercatorGrid&, const NodeWindow&) const;
 
 }  // namespace terrace::dem

@@ -12,8 +12,7 @@
 #include "engine/crs/footprint.h"
 #include "engine/crs/geoid.h"
 #include "engine/crs/undulation_grid.h"
-#include "engine/geo/lattice.h"
-#include "engine/geo/mercator_grid.h"
+#include "engine/geo/node_grid.h"
 
 namespace terrace::dem {
 
@@ -58,9 +57,8 @@ class Undulations {
 
   // Returns the undulations of the window's nodes, row by row; NaN outside the area and where the geoid is not known. A
   // value depends only on the global node and has the same bits in every window. All nodes of a pole row have the same
-  // value. `Grid`: geo::Lattice or geo::MercatorGrid.
-  template <typename Grid>
-  Result<std::vector<double>> At(const Grid& grid, const NodeWindow& window) const;
+  // value.
+  Result<std::vector<double>> At(const geo::NodeGrid& grid, const NodeWindow& window) const;
 
   // Returns a range that contains all values of At in a box with south-western corner (west, south), `width` by
   // `height` degrees; west counts modulo 360. If the box does not meet the area, the range of the whole area.
@@ -78,10 +76,8 @@ class Undulations {
  private:
   Undulations(std::shared_ptr<const Geoid> geoid, const Footprint& area) : geoid_(std::move(geoid)), area_(area) {}
   Result<void> FindPoles();
-  template <typename Grid>
-  void Evaluate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
-  template <typename Grid>
-  Result<void> Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
+  void Evaluate(const geo::NodeGrid& grid, const NodeWindow& window, std::vector<double>& out) const;
+  Result<void> Interpolate(const geo::NodeGrid& grid, const NodeWindow& window, std::vector<double>& out) const;
   double EastOfArea(double longitude) const;  // degrees, 0 .. 360
   bool IsInside(double longitude, double latitude) const;
   const HeightRange& BoxAt(double longitude, double latitude) const;

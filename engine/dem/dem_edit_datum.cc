@@ -5,7 +5,6 @@
 
 #include "engine/crs/geoid.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
 namespace {
@@ -81,12 +80,9 @@ bool ElevationModel::Impl::CountsFrom(const std::string& geoid, HeightDatum datu
                              [&](std::size_t i) { return GeoidIn(datum, grids[i].vertical()) == geoid; });
 }
 
-template <typename NodeGrid>
-Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const NodeGrid& node_grid, const NodeWindow& window,
-                                                                   std::span<const std::size_t> which,
-                                                                   HeightDatum datum, std::span<const float> unedited,
-                                                                   const std::string& what,
-                                                                   const std::stop_token& stop) const {
+Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(
+    const geo::NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which, HeightDatum datum,
+    std::span<const float> unedited, const std::string& what, const std::stop_token& stop) const {
   const bool are_in_datum = std::ranges::all_of(which, [&](std::size_t number) {
     const Edit& edit = edits->edits()[number];
     return !edit.changes_heights() || edit.TargetDatum(datum) == datum;
@@ -98,14 +94,5 @@ Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const NodeGri
   for (std::size_t k = 0; k < undulations.size(); ++k) undulations[k] -= static_cast<double>(unedited[k]);
   return undulations;
 }
-
-template Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const geo::Lattice&, const NodeWindow&,
-                                                                            std::span<const std::size_t>, HeightDatum,
-                                                                            std::span<const float>, const std::string&,
-                                                                            const std::stop_token&) const;
-template Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const geo::MercatorGrid&, const NodeWindow&,
-                                                                            std::span<const std::size_t>, HeightDatum,
-                                                                            std::span<const float>, const std::string&,
-                                                                            const std::stop_token&) const;
 
 }  // namespace terrace::dem

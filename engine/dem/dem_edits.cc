@@ -216,14 +216,12 @@ Result<void> ElevationModel::Impl::OpenEdits(const DemOptions& options) {
   return {};
 }
 
-template <typename NodeGrid>
-std::vector<std::size_t> ElevationModel::Impl::EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const {
+std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::NodeGrid& node_grid, const NodeWindow& window) const {
   if (edits == nullptr) return {};
   return edits->Find(BoxOf(node_grid, window));
 }
 
-template <typename NodeGrid>
-Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
+Result<void> ElevationModel::Impl::ApplyEdits(const geo::NodeGrid& node_grid, const NodeWindow& window,
                                               std::span<const std::size_t> which, const EditedDatum& datum,
                                               std::span<float> heights, const std::stop_token& stop,
                                               double* error_m) const {
@@ -239,32 +237,21 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
         other.ReadGrids(node_grid, window, wanted.second, edit.source, stop, error_m != nullptr ? &readings : nullptr);
     if (!read) return tl::unexpected(std::move(read).error());
     ReplacementHeights result{*std::move(read), 0};
-    if constexpr (std::is_same_v<NodeGrid, geo::Lattice>) {
-      if (error_m != nullptr) {
-        result.void_cells = other.VoidCells(node_grid, window, readings);
-        TileHeights tile{node_grid, window.columns, result.heights};
-        for (std::size_t k = 0; k < tile.heights.size(); ++k) {
-          if (std::isnan(tile.heights[k])) tile.heights[k] = heights[k];
-        }
-        // The samples of the sources lie between those of the replacement, and are compared with its heights there.
-        const auto bound = other.BoundError(tile, window, std::move(readings), stop, /*counts_between=*/true);
-        if (!bound) return tl::unexpected(bound.error());
-        result.error_m = *bound;
+    if (const geo::Lattice* const lattice = node_grid.lattice(); lattice != nullptr && error_m != nullptr) {
+      result.void_cells = other.VoidCells(*lattice, window, readings);
+      TileHeights tile{*lattice, window.columns, result.heights};
+      for (std::size_t k = 0; k < tile.heights.size(); ++k) {
+        if (std::isnan(tile.heights[k])) tile.heights[k] = heights[k];
       }
+      // The samples of the sources lie between those of the replacement, and are compared with its heights there.
+      const auto bound = other.BoundError(tile, window, std::move(readings), stop, /*counts_between=*/true);
+      if (!bound) return tl::unexpected(bound.error());
+      result.error_m = *bound;
     }
     return &known.emplace(wanted, std::move(result)).first->second;
   };
   return edits->Apply(node_grid, window, which, datum, heights, replacement, stop, error_m);
 }
-
-template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
-template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::MercatorGrid&, const NodeWindow&) const;
-template Result<void> ElevationModel::Impl::ApplyEdits(const geo::Lattice&, const NodeWindow&,
-                                                       std::span<const std::size_t>, const EditedDatum&,
-                                                       std::span<float>, const std::stop_token&, double*) const;
-template Result<void> ElevationModel::Impl::ApplyEdits(const geo::MercatorGrid&, const NodeWindow&,
-                                                       std::span<const std::size_t>, const EditedDatum&,
-                                                       std::span<float>, const std::stop_token&, double*) const;
 
 // Where there is no height, an edit whose weight is 1 makes one if `datum` is kEllipsoid; in other datums it stays
 // void.

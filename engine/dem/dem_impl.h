@@ -1,7 +1,6 @@
 // Private: the state of an ElevationModel. Immutable after Open.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -15,6 +14,7 @@
 
 #include "engine/dem/elevation_model.h"
 #include "engine/edits/edit_set.h"
+#include "engine/geo/node_grid.h"
 #include "engine/mosaic/raster_grid.h"
 
 namespace terrace::dem {
@@ -34,26 +34,22 @@ struct GridContent {
 
 class ElevationModel::Impl {
  public:
-  // `what`: names the request in messages. `NodeGrid`: geo::Lattice or geo::MercatorGrid.
-  template <typename NodeGrid>
-  Result<std::vector<float>> ReadNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  // `what`: names the request in messages.
+  Result<std::vector<float>> ReadNodes(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                        const std::string& what, const std::stop_token& stop) const;
   // The same before the edits. `readings`: unless null, receives the readings of the raster grids that were read, in
   // order.
-  template <typename NodeGrid>
-  Result<std::vector<float>> ReadUnedited(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  Result<std::vector<float>> ReadUnedited(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                           const std::string& what, const std::stop_token& stop,
                                           std::vector<PartReading>* readings = nullptr) const;
   // Replaces NaN by the floor, in the datum of the last raster grid that refers to a geoid, or above the ellipsoid.
-  template <typename NodeGrid>
-  Result<void> FillWithFloor(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  Result<void> FillWithFloor(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                              std::span<float> heights) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
 
-  template <typename NodeGrid>
-  Result<std::vector<float>> ReadGrids(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  Result<std::vector<float>> ReadGrids(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                        const std::string& what, const std::stop_token& stop,
                                        std::vector<PartReading>* readings) const;
   // `counts_between`: as for SourceErrorBound.
@@ -75,8 +71,7 @@ class ElevationModel::Impl {
   bool CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const;
   // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.
-  template <typename NodeGrid>
-  Result<std::vector<double>> DatumUndulations(const NodeGrid& node_grid, const NodeWindow& window,
+  Result<std::vector<double>> DatumUndulations(const geo::NodeGrid& node_grid, const NodeWindow& window,
                                                std::span<const std::size_t> which, HeightDatum datum,
                                                std::span<const float> unedited, const std::string& what,
                                                const std::stop_token& stop) const;
@@ -86,16 +81,14 @@ class ElevationModel::Impl {
   Result<std::string> OpenReplacement(Edit& edit, const DemOptions& options,
                                       std::map<std::string, std::size_t>& opened);
   // `error_m`: as for EditSet::Apply.
-  template <typename NodeGrid>
-  Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
+  Result<void> ApplyEdits(const geo::NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           const EditedDatum& datum, std::span<float> heights, const std::stop_token& stop,
                           double* error_m = nullptr) const;
   // ReplacementHeights::void_cells. `readings`: of this model, for the window. dem_replacement_voids.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
                                       std::span<const PartReading> readings) const;
   // The edits that may reach the nodes of a window.
-  template <typename NodeGrid>
-  std::vector<std::size_t> EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const;
+  std::vector<std::size_t> EditsAt(const geo::NodeGrid& node_grid, const NodeWindow& window) const;
   Result<void> EditPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
   // dem_read.cc.
@@ -148,15 +141,7 @@ class ElevationModel::Impl {
 std::string GeoidIn(HeightDatum datum, const VerticalDatum& source);
 
 // A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.
-template <typename NodeGrid>
-Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
-  constexpr double kSlack = 1e-9;
-  const double west = node_grid.Longitude(window.column);
-  const auto [south, north] =
-      std::minmax({node_grid.Latitude(window.row), node_grid.Latitude(window.row + window.rows - 1)});
-  return {west - kSlack, south - kSlack, west + (window.columns - 1) * node_grid.StepDegrees() + kSlack,
-          north + kSlack};
-}
+Box BoxOf(const geo::NodeGrid& node_grid, const NodeWindow& window);
 
 // An index of raster grids by the box in degrees where they may have heights. Each box is entered three
 // times, 360 degrees apart, so that it is found with longitudes from -540 to 540.

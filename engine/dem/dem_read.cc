@@ -35,8 +35,7 @@ struct NodeRange {
 
 // The nodes of a window that may get heights from a raster grid, plus `around` more on each side. Where there are
 // none, a window of one node: reading it checks the grid's files.
-template <typename NodeGrid>
-NodeWindow PartOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, int around) {
+NodeWindow PartOf(const RasterGrid& grid, const geo::NodeGrid& node_grid, const NodeWindow& window, int around) {
   const Footprint& reach = grid.reach();
   const bool is_polar = grid.pole_heights()[0] || grid.pole_heights()[1];
   if (is_polar || reach.south <= -90 || reach.north >= 90 || reach.all_longitudes()) return window;
@@ -76,9 +75,8 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
 
 // RasterGrid::FillNodes. If there are many raster grids, only for the part of the window that this one reaches: a
 // shallow tile may have thousands of small ones, and their readings are kept until all heights are known.
-template <typename NodeGrid>
-Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
-                         HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop,
+Result<void> FillNodesOf(const RasterGrid& grid, const geo::NodeGrid& node_grid, const NodeWindow& window,
+                         std::size_t grids, HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop,
                          PartReading* reading_of_part) {
   GridReading* const reading = reading_of_part != nullptr ? &reading_of_part->reading : nullptr;
   if (grids <= kFewGrids) return grid.FillNodes(node_grid, window, datum, nodes, stop, reading);
@@ -182,8 +180,7 @@ class Blend {
   std::vector<double> open_;  // weight left for raster grids further down
 };
 
-template <typename NodeGrid>
-Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_grid, const NodeWindow& window,
+Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const geo::NodeGrid& node_grid, const NodeWindow& window,
                                                            HeightDatum datum, const std::string& what,
                                                            const std::stop_token& stop,
                                                            std::vector<PartReading>* readings) const {
@@ -219,6 +216,15 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
   return heights;
 }
 
+Box BoxOf(const geo::NodeGrid& node_grid, const NodeWindow& window) {
+  constexpr double kSlack = 1e-9;
+  const double west = node_grid.Longitude(window.column);
+  const auto [south, north] =
+      std::minmax({node_grid.Latitude(window.row), node_grid.Latitude(window.row + window.rows - 1)});
+  return {west - kSlack, south - kSlack, west + (window.columns - 1) * node_grid.StepDegrees() + kSlack,
+          north + kSlack};
+}
+
 std::vector<std::size_t> ElevationModel::Impl::GridsAt(const Box& box) const {
   // A single grid is read even where it has no heights. Reading checks its files, so that a tile of floor does not
   // outlive the dataset's only source.
@@ -235,9 +241,8 @@ const geo::Lattice& ElevationModel::Impl::LatticeOf(int level) const {
   return lattices[static_cast<std::size_t>(level)];
 }
 
-template <typename NodeGrid>
-Result<void> ElevationModel::Impl::FillWithFloor(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
-                                                 std::span<float> heights) const {
+Result<void> ElevationModel::Impl::FillWithFloor(const geo::NodeGrid& node_grid, const NodeWindow& window,
+                                                 HeightDatum datum, std::span<float> heights) const {
   if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr || !HasVoids(heights)) {
     ReplaceVoids(heights, floor);
     return {};
@@ -251,8 +256,7 @@ Result<void> ElevationModel::Impl::FillWithFloor(const NodeGrid& node_grid, cons
   return {};
 }
 
-template <typename NodeGrid>
-Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const NodeGrid& node_grid, const NodeWindow& window,
+Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const geo::NodeGrid& node_grid, const NodeWindow& window,
                                                               HeightDatum datum, const std::string& what,
                                                               const std::stop_token& stop,
                                                               std::vector<PartReading>* readings) const {
@@ -264,17 +268,7 @@ Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const NodeGrid& no
   return heights;
 }
 
-template Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const geo::Lattice&, const NodeWindow&,
-                                                                       HeightDatum, const std::string&,
-                                                                       const std::stop_token&,
-                                                                       std::vector<PartReading>*) const;
-template Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const geo::MercatorGrid&, const NodeWindow&,
-                                                                       HeightDatum, const std::string&,
-                                                                       const std::stop_token&,
-                                                                       std::vector<PartReading>*) const;
-
-template <typename NodeGrid>
-Result<std::vector<float>> ElevationModel::Impl::ReadNodes(const NodeGrid& node_grid, const NodeWindow& window,
+Result<std::vector<float>> ElevationModel::Impl::ReadNodes(const geo::NodeGrid& node_grid, const NodeWindow& window,
                                                            HeightDatum datum, const std::string& what,
                                                            const std::stop_token& stop) const {
   if (floor_undulations == nullptr) datum = HeightDatum::kEllipsoid;  // the same heights

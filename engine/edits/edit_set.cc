@@ -10,7 +10,6 @@
 #include "engine/edits/edit_error_bound.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/edit_window.h"
-#include "engine/geo/mercator_grid.h"
 #include "engine/raster/grid_cells.h"
 
 namespace terrace::dem {
@@ -77,8 +76,7 @@ bool EditSet::Any(const Box& degrees) const {
   return false;
 }
 
-template <typename NodeGrid>
-Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
+Result<void> EditSet::Apply(const geo::NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
                             const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replacement,
                             const std::stop_token& stop, double* error_m) const {
   if (which.empty()) return {};
@@ -138,13 +136,6 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
   if (errors) *error_m = errors->bound();
   return {};
 }
-
-template Result<void> EditSet::Apply(const geo::Lattice&, const NodeWindow&, std::span<const std::size_t>,
-                                     const EditedDatum&, std::span<float>, const ReadReplacement&,
-                                     const std::stop_token&, double*) const;
-template Result<void> EditSet::Apply(const geo::MercatorGrid&, const NodeWindow&, std::span<const std::size_t>,
-                                     const EditedDatum&, std::span<float>, const ReadReplacement&,
-                                     const std::stop_token&, double*) const;
 
 double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, const EditedDatum& datum,
                         double height, const std::function<double(const Edit&)>& replacement, EditRows& rows) const {
@@ -232,7 +223,7 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
   MeshDemands demands;
   const std::size_t nodes = Area(window.columns, window.rows);
   const auto stride = static_cast<std::size_t>(window.columns);
-  std::optional<WindowAxes<geo::Lattice>> axes;
+  std::optional<WindowAxes> axes;
   // Beyond the largest error that a tile of this level is served at, a limit has no effect.
   constexpr double kLargest_m = 77'067 * 32.0;
   const double coarsest = std::ldexp(kLargest_m, -lattice.level);

@@ -21,6 +21,7 @@
 #include "engine/edits/edit_effects.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/lattice.h"
+#include "engine/geo/node_grid.h"
 
 namespace terrace::dem {
 
@@ -52,13 +53,12 @@ class EditSet {
   bool Any(const Box& degrees) const;
 
   // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. With
-  // that weight, an edit that is stated in the heights' datum makes the height exactly the stated one. `NodeGrid`:
-  // geo::Lattice or geo::MercatorGrid. `replacement`: heights in the datum if the edit is stated in it, else above the
-  // ellipsoid. `error_m`, unless null: of heights above the ellipsoid, an upper bound of the distance between the
-  // surface through the tile's nodes, all finite, and the samples of the sources. It is replaced by the bound for the
-  // edited surface and the edited samples. The window then has a halo of one, which does not count. Errors: kCancelled.
-  template <typename NodeGrid>
-  Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
+  // that weight, an edit that is stated in the heights' datum makes the height exactly the stated one.
+  // `replacement`: heights in the datum if the edit is stated in it, else above the ellipsoid. `error_m`, unless null:
+  // of heights above the ellipsoid, an upper bound of the distance between the surface through the tile's nodes, all
+  // finite, and the samples of the sources. It is replaced by the bound for the edited surface and the edited samples.
+  // The window then has a halo of one, which does not count. Errors: kCancelled.
+  Result<void> Apply(const geo::NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
                      const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replacement,
                      const std::stop_token& stop, double* error_m = nullptr) const;
 

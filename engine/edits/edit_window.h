@@ -8,14 +8,14 @@
 
 #include "engine/common/box_index.h"
 #include "engine/common/dem_types.h"
+#include "engine/geo/node_grid.h"
 
 namespace terrace::dem {
 
 // Positions of a window's columns and rows.
-template <typename NodeGrid>
 class WindowAxes {
  public:
-  WindowAxes(const NodeGrid& grid, const NodeWindow& window)
+  WindowAxes(const geo::NodeGrid& grid, const NodeWindow& window)
       : west_(grid.Longitude(window.column)), step_(grid.StepDegrees()) {
     for (int i = 0; i < window.columns; ++i) longitudes_.push_back(grid.Longitude(window.column + i));
     for (int j = 0; j < window.rows; ++j) latitudes_.push_back(grid.Latitude(window.row + j));

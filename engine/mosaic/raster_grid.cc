@@ -36,11 +36,9 @@ Result<Georeference> GeoreferenceOf(const GridPlan& plan) {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-int FactorOf(const geo::Lattice& lattice, const SourceSpacing& spacing) {
-  return AveragingFactor(SamplesPerCell(lattice, spacing));
-}
-int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
-  return MercatorFactor(grid.depth, spacing);
+int FactorOf(const geo::NodeGrid& grid, const SourceSpacing& spacing) {
+  return grid.lattice() ? AveragingFactor(SamplesPerCell(*grid.lattice(), spacing))
+                        : MercatorFactor(grid.mercator()->depth, spacing);
 }
 
 void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, bool are_all,
@@ -446,13 +444,11 @@ NodeCells RasterGrid::CellsOf(const geo::Lattice& lattice, const NodeWindow& win
   return cells;
 }
 
-template <typename NodeGrid>
-NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const {
+NodePositions RasterGrid::PositionsOf(const geo::NodeGrid& node_grid, const NodeWindow& window, int factor) const {
   return NodePositions::Of(georeference_, reach_, node_grid, window, kGridPositionTolerance * factor);
 }
 
-template <typename NodeGrid>
-Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+Result<void> RasterGrid::FillNodes(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                    const NodeHeights& nodes, const std::stop_token& stop, GridReading* reading) const {
   const int factor = FactorOf(node_grid, spacing_);
   NodePositions positions = PositionsOf(node_grid, window, factor);
@@ -460,7 +456,7 @@ Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& 
   if (reading != nullptr) reading->factor = factor;
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
-    if (!IsPoleRow(node_grid, global)) continue;
+    if (!node_grid.IsPoleRow(global)) continue;
     // If columns are meridians, all nodes of a pole have one value.
     const auto first = static_cast<std::size_t>(row) * positions.columns();
     std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
@@ -477,10 +473,5 @@ Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& 
   if (reading != nullptr) reading->undulations = undulations;
   return FillNodesAt(std::move(positions), inside, undulations, factor, nodes, stop, reading);
 }
-
-template Result<void> RasterGrid::FillNodes(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
-                                            const std::stop_token&, GridReading*) const;
-template Result<void> RasterGrid::FillNodes(const geo::MercatorGrid&, const NodeWindow&, HeightDatum,
-                                            const NodeHeights&, const std::stop_token&, GridReading*) const;
 
 }  // namespace terrace::dem

@@ -22,7 +22,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/crs/undulations.h"
-#include "engine/geo/mercator_grid.h"
+#include "engine/geo/node_grid.h"
 #include "engine/mosaic/grid_cover.h"
 #include "engine/mosaic/grid_members.h"
 #include "engine/mosaic/grid_voids.h"
@@ -115,9 +115,7 @@ class RasterGrid {
   // Replaces NaN among the window's heights by the raster grid's heights, where it has them. A height depends on the
   // node alone, not on the window. Fills in `reading` unless it is null. Errors: kUnavailable (a raster cannot be read
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
-  // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
-  template <typename NodeGrid>
-  Result<void> FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  Result<void> FillNodes(const geo::NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                          const NodeHeights& nodes, const std::stop_token& stop, GridReading* reading = nullptr) const;
 
   // Returns the cells in which FillNodes locates the window's nodes. Where columns wrap, they are moved by whole turns
@@ -216,8 +214,7 @@ class RasterGrid {
   // contrary.
   bool IsUnfilledVoid(int factor, const GridWindow& window) const;
   // Returns the pixel positions of the window's nodes for averages by `factor`.
-  template <typename NodeGrid>
-  NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
+  NodePositions PositionsOf(const geo::NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // `inside`: one entry per node, 0 where it gets no height. `undulations`: one per node, added to heights; empty:
   // none are.
   Result<void> FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,

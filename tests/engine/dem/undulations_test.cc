@@ -21,8 +21,7 @@ std::shared_ptr<const Undulations> Over(std::shared_ptr<const Geoid> geoid, cons
   return undulations ? *std::move(undulations) : nullptr;
 }
 
-template <typename Grid>
-std::vector<double> At(const Undulations& undulations, const Grid& grid, const NodeWindow& window) {
+std::vector<double> At(const Undulations& undulations, const geo::NodeGrid& grid, const NodeWindow& window) {
   auto values = undulations.At(grid, window);
   EXPECT_TRUE(values) << values.error().message;
   return values ? *std::move(values) : std::vector<double>{};
