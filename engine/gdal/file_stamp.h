@@ -23,8 +23,9 @@ struct FileStamp {
   }
 };
 
-// Returns the file's stamp; nullopt if `path` is not a regular file.
+// Returns the file's stamp; nullopt if `path` or `descriptor` is not a regular file.
 std::optional<FileStamp> StampOf(const std::string& path);
+std::optional<FileStamp> StampOf(int descriptor);
 
 // How the bytes of files are hashed (file_content.h).
 struct FileContentOptions {

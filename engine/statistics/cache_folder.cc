@@ -1,16 +1,15 @@
 #include "engine/statistics/cache_folder.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "engine/common/open_file.h"
@@ -30,35 +29,13 @@ std::string FinishedName(std::string name) {
   return hash.front() == '-' && std::ranges::all_of(hash.substr(1), is_digit) ? name : std::string();
 }
 
-struct Folder {
-  explicit Folder(const std::string& path) : entries(::opendir(path.c_str())) {}
-  ~Folder() {
-    if (entries != nullptr) ::closedir(entries);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  DIR* const entries;
-};
-
-struct Found {
-  std::uint64_t device = 0, inode = 0;
-  std::uint64_t bytes = 0;
-  std::int64_t modified_ns = 0;
-};
-
 // Nothing if it is not a file of terrace's; a link is not.
-std::optional<Found> LookAt(int folder, const char* name) {
-  const OpenFile file(::openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  struct stat status {};
+std::optional<FileStamp> LookAt(const std::string& path) {
+  const OpenFile file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  const std::optional<FileStamp> stamp = StampOf(file.get());
   std::uint64_t magic = 0;
-  if (!file.is_open() || ::fstat(file.get(), &status) != 0 || !S_ISREG(status.st_mode) ||
-      !ReadAt(file.get(), 0, &magic, sizeof magic) || magic != CacheFolder::kMagic) {
-    return std::nullopt;
-  }
-  constexpr std::int64_t kNanoseconds = 1'000'000'000;
-  return Found{status.st_dev, status.st_ino, static_cast<std::uint64_t>(status.st_size),
-               status.st_mtim.tv_sec * kNanoseconds + status.st_mtim.tv_nsec};
+  const bool is_ours = stamp && ReadAt(file.get(), 0, &magic, sizeof magic) && magic == CacheFolder::kMagic;
+  return is_ours ? stamp : std::nullopt;
 }
 
 }  // namespace
@@ -107,17 +84,14 @@ void CacheFolder::Scan() {
   bytes_ = since_scan_ = 0;
   scanned_at_ = std::chrono::steady_clock::now();
   oldest_first_.clear();
-  const Folder folder(path_);
-  if (folder.entries == nullptr) return;
-  while (const dirent* const entry = ::readdir(folder.entries)) {
-    const std::string name = entry->d_name;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(path_, error), end; entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
     if (FinishedName(name).empty()) continue;
-    const auto found = LookAt(::dirfd(folder.entries), name.c_str());
-    if (!found) continue;
-    bytes_ += found->bytes;
-    if (IsInUse(name)) continue;
-    oldest_first_.emplace(found->modified_ns,
-                          File{name, found->device, found->inode, found->bytes, found->modified_ns});
+    const auto stamp = LookAt(entry->path().string());
+    if (!stamp) continue;
+    bytes_ += stamp->size;
+    if (!IsInUse(name)) oldest_first_.emplace(static_cast<std::int64_t>(stamp->modified_ns), File{name, *stamp});
   }
 }
 
@@ -131,15 +105,10 @@ void CacheFolder::Evict(std::uint64_t bytes) {
     const std::string path = (std::filesystem::path(path_) / file.name).string();
     const OpenFile opened(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     const bool is_written = opened.is_open() && ::flock(opened.get(), LOCK_EX | LOCK_NB) != 0;
-    const auto now = LookAt(AT_FDCWD, path.c_str());
-    if (!now || is_written || now->device != file.device || now->inode != file.inode ||
-        now->modified_ns != file.modified_ns) {
-      continue;
-    }
-    if (::unlink(path.c_str()) != 0) continue;
+    if (is_written || LookAt(path) != file.stamp || ::unlink(path.c_str()) != 0) continue;
     spdlog::debug("cache_dir {}: {} was not used for longest and is removed", path_, file.name);
-    gone += file.bytes;
-    bytes_ -= std::min(bytes_, file.bytes);
+    gone += file.stamp.size;
+    bytes_ -= std::min(bytes_, file.stamp.size);
   }
 }
 

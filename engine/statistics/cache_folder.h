@@ -22,6 +22,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "engine/gdal/file_stamp.h"
 
 namespace terrace::dem {
 
@@ -71,9 +72,7 @@ class CacheFolder {
  private:
   struct File {
     std::string name;  // in the folder
-    std::uint64_t device = 0, inode = 0;
-    std::uint64_t bytes = 0;
-    std::int64_t modified_ns = 0;
+    FileStamp stamp;
   };
   void Scan();
   void Evict(std::uint64_t bytes);
