@@ -4,9 +4,7 @@
 #include <ogr_spatialref.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <optional>
+#include <cstdint>
 
 #include "engine/common/dem_types.h"
 #include "engine/crs/georeference.h"
@@ -15,6 +13,7 @@
 #include "engine/gdal/sample_messages.h"
 #include "engine/gdal/sample_rules.h"
 #include "engine/statistics/raster_chunk.h"
+#include "engine/statistics/sample_rows.h"
 #include "engine/statistics/undeclared_nodata.h"
 
 namespace terrace::dem {
@@ -33,28 +32,17 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   return {};
 }
 
-// Empty: there is no height.
-std::optional<HeightRange> RangeOf(const std::vector<float>& heights) {
-  float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
-  for (const float height : heights) {
-    lowest = std::min(lowest, height);  // ignores NaN, the second argument
-    highest = std::max(highest, height);
-  }
-  if (!(lowest <= highest)) return std::nullopt;
-  return HeightRange{lowest, highest};
-}
-
 // Detects undeclared voids of a raster in memory, by the same rules as for served rasters (raster_statistics.h).
 Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
                                    double spacing_m) {
-  const std::optional<HeightRange> range = RangeOf(raster.heights);
-  const bool has_voids = std::ranges::any_of(raster.heights, [](float height) { return std::isnan(height); });
+  BlockRange range;
+  const std::int64_t valid = AddToRange(raster.heights, range);
   ZeroEdges zeros;
   const double coast_step_m = ZeroEdges::CoastStep(spacing_m);
   zeros.Add(raster.heights.data(), raster.width, {0, 0, raster.width, raster.height}, raster.width, raster.height,
             coast_step_m);
   const bool has_collar = zeros.IsCollar(raster.width, raster.height);
-  if (!range || !MayHideVoids(rules, range->min, range->max, has_voids, has_collar)) return DetectedNodata{};
+  if (valid == 0 || !MayHideVoids(rules, range.min, range.max, range.has_voids, has_collar)) return DetectedNodata{};
   return FindVoids(band, rules, has_collar, coast_step_m);
 }
 
@@ -93,10 +81,11 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   };
   if (auto read = ReadAll(band, rules, options.progress, raster); !read) return damaged(read.error());
   const auto finish = [&]() -> Result<RasterHeights> {
-    const std::optional<HeightRange> range = RangeOf(raster.heights);
-    if (!range) return MakeError(ErrorCode::kNotFound, "{}", DescribeLackOfHeights(rules, path));
+    BlockRange range;
+    if (AddToRange(raster.heights, range) == 0)
+      return MakeError(ErrorCode::kNotFound, "{}", DescribeLackOfHeights(rules, path));
     raster.heights_doubted = MetresPerUnit(rules.unit)
-                                 ? DoubtsOf(*range)
+                                 ? DoubtsOf({range.min, range.max})
                                  : fmt::format(
                                        "height unit \"{}\" is not known, heights are taken as metres: state metres a "
                                        "unit with `gdal_translate -a_scale FACTOR in out`",
