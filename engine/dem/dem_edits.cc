@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/crs/footprint.h"
 #include "engine/crs/node_positions.h"
 #include "engine/dem/corner_edges.h"
 #include "engine/dem/dem_impl.h"
@@ -24,10 +25,7 @@ namespace terrace::dem {
 namespace {
 
 bool Meets(const Box& box, const GeoBounds& bounds) {
-  const double east = bounds.west > bounds.east ? bounds.east + 360 : bounds.east;
-  if (box.max_y < bounds.south || box.min_y > bounds.north) return false;
-  return std::ranges::any_of(std::array{-360.0, 0.0, 360.0},
-                             [&](double turn) { return box.max_x + turn >= bounds.west && box.min_x + turn <= east; });
+  return Footprint::Of(bounds).Touches(box.min_x, box.min_y, box.max_x - box.min_x, box.max_y - box.min_y);
 }
 
 GeoPosition MiddleOf(const Edit& edit) { return {edit.plane.longitude, edit.plane.latitude}; }
