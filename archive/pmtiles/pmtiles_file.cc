@@ -11,8 +11,6 @@
 namespace terrace::archive {
 namespace {
 
-constexpr std::size_t kRecentLeaves = 8;
-
 // The last entry that begins at or before the tile.
 const DirectoryEntry* EntryFor(const std::vector<DirectoryEntry>& entries, std::uint64_t tile_id) {
   const auto after = std::ranges::upper_bound(entries, tile_id, {}, &DirectoryEntry::tile_id);
@@ -62,7 +60,6 @@ Result<PmtilesFile::LeafPtr> PmtilesFile::ReadLeaf(const DirectoryEntry& leaf) c
   Result<std::vector<DirectoryEntry>> entries = DecodeDirectory(*bytes, header_.leaves.length, header_.data.length);
   if (!entries) return tl::unexpected(Damaged(entries.error().message));
   auto made = std::make_shared<Leaf>();
-  made->offset = leaf.offset;
   made->rows_at = header_.leaves.offset + leaf.offset + leaf.length;
   const std::uint64_t max_rows = (header_.leaves.end() - made->rows_at) / kRowBytes;
   std::uint64_t rows = 0;
@@ -78,19 +75,9 @@ Result<PmtilesFile::LeafPtr> PmtilesFile::ReadLeaf(const DirectoryEntry& leaf) c
 }
 
 Result<PmtilesFile::LeafPtr> PmtilesFile::FindLeaf(const DirectoryEntry& leaf) const {
-  {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(recent_, leaf.offset, [](const LeafPtr& kept) { return kept->offset; });
-    if (found != recent_.end()) {
-      recent_.splice(recent_.begin(), recent_, found);
-      return recent_.front();
-    }
-  }
+  if (LeafPtr known = recent_.Find(leaf.offset)) return known;
   Result<LeafPtr> read = ReadLeaf(leaf);  // several threads may read it: no harm
-  if (!read) return read;
-  const std::lock_guard lock(mutex_);
-  recent_.push_front(*read);
-  if (recent_.size() > kRecentLeaves) recent_.pop_back();
+  if (read) recent_.Insert(leaf.offset, *read, 1);
   return read;
 }
 

@@ -3,9 +3,7 @@
 
 #include <cstdint>
 #include <functional>
-#include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +11,7 @@
 #include "archive/files/input_file.h"
 #include "archive/pmtiles/directory.h"
 #include "archive/pmtiles/tile_row.h"
+#include "engine/common/lru_block_cache.h"
 #include "engine/core/result.h"
 
 namespace terrace::archive {
@@ -37,7 +36,7 @@ class PmtilesFile {
  private:
   // A directory of tiles, with the number of rows before each entry.
   struct Leaf {
-    std::uint64_t offset = 0, rows_at = 0;  // in the file
+    std::uint64_t rows_at = 0;  // in the file
     std::vector<DirectoryEntry> entries;
     std::vector<std::uint64_t> rows_before;
   };
@@ -56,8 +55,7 @@ class PmtilesFile {
   PmtilesHeader header_;
   std::string metadata_;
   std::vector<DirectoryEntry> root_;
-  mutable std::mutex mutex_;
-  mutable std::list<LeafPtr> recent_;  // most recently used first; guarded by mutex_
+  mutable dem::LruBlockCache<std::uint64_t, Leaf> recent_{8};  // leaves by offset; counts leaves instead of bytes
 };
 
 }  // namespace terrace::archive
