@@ -9,7 +9,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
+// A latency of a fraction of a millisecond keeps its precision.
+double Rounded(double value) { return std::round(value * 1e8) / 1e8; }
 
 Json OrNull(double value) { return value < 0 ? Json(nullptr) : Json(Rounded(value)); }
 

@@ -202,6 +202,17 @@ TEST(Requirements, NameThePartThatIsWrong) {
   }
 }
 
+TEST(JsonReport, KeepsThePrecisionOfShortLatencies) {
+  Statistics statistics(1);
+  RequestRecord tile;
+  tile.seconds = 0.00034375;
+  statistics.AddRequest(0.5, tile);
+  const FlightRecord record = statistics.record();
+  const std::string json = JsonOf(SomeOptions(), Summarize(SomeOptions(), record), {}, record.seconds);
+  EXPECT_NE(json.find(R"("max": 0.00034375)"), std::string::npos) << json;
+  EXPECT_NE(json.find(R"("p50_s": 0.00034375)"), std::string::npos) << json;
+}
+
 TEST(HtmlReport, StandsAlone) {
   Statistics statistics(1);
   Fill(statistics);
