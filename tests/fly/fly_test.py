@@ -49,6 +49,11 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual(earlier.read_text(), "an earlier report", "the new one replaces it, and does not overwrite it")
                 self.assertEqual({file.name for file in page.parent.iterdir()}, {"urls", "page.html", "earlier"})
 
+    def test_takes_the_format_from_the_path_of_the_url(self):
+        for path, form in (("a/layer.json?x=tileset.json", "terrain"), ("a/tileset.json?x=layer.json", "3dtiles")):
+            _, report = fly("127.0.0.1:1", "--first-view-limit", "0.1", path=path)
+            self.assertEqual(report["format"], form)
+
     def test_flies_with_several_clients(self):
         status, report = fly(flights.UPSTREAM, "--clients", "3", way=["--circle", "-84.25,36.3,3000,5000"])
         self.assertEqual(status, 0)

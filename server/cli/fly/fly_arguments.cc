@@ -142,7 +142,8 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
     options.http.headers.push_back(*std::move(header));
   }
   options.document = *std::move(document);
-  const bool is_3d = arguments.format == "3dtiles" || options.document.target.find("tileset.json") != std::string::npos;
+  const std::string& target = options.document.target;
+  const bool is_3d = arguments.format == "3dtiles" || target.substr(0, target.find('?')).ends_with("tileset.json");
   options.format = is_3d ? fly::Format::k3dTiles : fly::Format::kTerrain;
   options.path = *std::move(path);
   options.duration_s = arguments.duration >= 0 ? arguments.duration : std::max(10.0, options.path.duration_s());
