@@ -358,7 +358,7 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
     }
     const Tile& loaded = tile.content == Content::kUpsampled ? *tile.parent : tile;
     if (tile.state != LoadState::kReady || loaded.version == 0) continue;
-    if (loaded.stated_error_m >= 0) {
+    if (loaded.stated_error_m >= 0 && drawn.distance_m > 0) {
       const double px = view.ErrorInPixels(loaded.stated_error_m, drawn.distance_m);
       record.worst_stated_px = std::clamp(px, record.worst_stated_px, kWorstPixels);
     }

@@ -160,7 +160,9 @@ TimePlot ErrorPlot(const FlightOptions& options, const std::vector<Second>& seco
   return {
       .title = "Worst error on screen",
       .unit = "pixels, logarithmic",
-      .note = "Assumed: of the levels, where a finer tile exists. Stated: of Terrain-Max-Error, on all tiles.",
+      .note =
+          "Assumed: of the levels, where a finer tile exists. Stated: of Terrain-Max-Error, on all tiles whose "
+          "volume the camera is not in.",
       .series = {{"assumed", "var(--b)", ValuesOf(seconds, [](auto& s) { return PositiveOrNone(s.worst_px); })},
                  {"stated", "var(--a)", ValuesOf(seconds, [](auto& s) { return PositiveOrNone(s.worst_stated_px); })}},
       .is_logarithmic = true,

@@ -49,6 +49,12 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual(earlier.read_text(), "an earlier report", "the new one replaces it, and does not overwrite it")
                 self.assertEqual({file.name for file in page.parent.iterdir()}, {"urls", "page.html", "earlier"})
 
+    def test_states_no_error_of_tiles_around_the_camera(self):
+        status, report = fly(flights.UPSTREAM, way=["--from", "-84.25,36.3,650", "--to", "-84.25,36.3,650"], duration="1")  # between heights of the tile
+        self.assertEqual(status, 0)
+        self.assertGreater(report["summary"]["screen_error_px"]["stated_max"], 0)
+        self.assertLess(report["summary"]["screen_error_px"]["stated_max"], 9999)
+
     def test_takes_the_format_from_the_path_of_the_url(self):
         for path, form in (("a/layer.json?x=tileset.json", "terrain"), ("a/tileset.json?x=layer.json", "3dtiles")):
             _, report = fly("127.0.0.1:1", "--first-view-limit", "0.1", path=path)
