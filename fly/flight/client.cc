@@ -7,6 +7,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -67,6 +68,12 @@ std::string Explain(const HttpReply& reply, Outcome outcome, bool is_document) {
   }
   if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
   return text;
+}
+
+// Of the tile and all of its descendants.
+void ForEachTile(Tile& tile, const std::function<void(Tile&)>& call) {
+  call(tile);
+  for (const auto& child : tile.children) ForEachTile(*child, call);
 }
 
 }  // namespace
@@ -182,7 +189,7 @@ void Client::Take(DecodedReply& decoded, double now_s) {
   record.outcome = decoded.outcome;
   record.is_tile = decoded.resource == Resource::kTile;
   record.tier = ParseCacheTier(decoded.reply.server_timing);
-  record.seconds = decoded.reply.seconds;
+  record.seconds = decoded.reply.seconds + (decoded.tile != nullptr ? decoded.tile->attempts.seconds : 0);
   record.bytes = decoded.reply.bytes;
   record.opened_connection = decoded.reply.opened_connection;
   record.triangles = decoded.content.triangles;
@@ -284,8 +291,10 @@ void Client::FailOrWait(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
   CheckVersion(decoded, now_s);
   if (!AsksAgain(decoded, tile.attempts)) return Fail(tile);
+  const double pause_s = PauseFor(decoded, tile.attempts);
+  tile.attempts.seconds += decoded.reply.seconds + pause_s;
   tile.waiting = true;
-  waiting_.push_back({&tile, now_s + PauseFor(decoded, tile.attempts)});
+  waiting_.push_back({&tile, now_s + pause_s});
   statistics_.AddRetry();
 }
 
@@ -302,10 +311,10 @@ void Client::WakeWaiting(double now_s) {
   });
 }
 
-void Client::StartLoad(Tile& tile) {
+void Client::StartLoad(Tile& tile, double now_s) {
   if (!tile.NeedsLoad()) return;
   if (tile.content == Content::kUpsampled) {
-    if (tile.parent->state == LoadState::kUnloaded) return StartLoad(*tile.parent);
+    if (tile.parent->state == LoadState::kUnloaded) return StartLoad(*tile.parent, now_s);
     tile.state = tile.parent->state;  // a quarter of a tile that has failed is a hole too
     return;
   }
@@ -314,13 +323,14 @@ void Client::StartLoad(Tile& tile) {
     tile.state = LoadState::kReady;
     return;
   }
+  tile.sent_s = now_s;
   SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request.uri);
 }
 
-void Client::StartLoads(const Selection& selection) {
+void Client::StartLoads(const Selection& selection, double now_s) {
   for (const LoadTask& task : selection.loads) {
     if (active_ >= options_.max_loads) return;
-    StartLoad(*task.tile);
+    StartLoad(*task.tile, now_s);
   }
 }
 
@@ -411,6 +421,7 @@ void Client::GiveUp(const std::string& why) {
 
 void Client::Frame(double now_s, bool is_late) {
   if (start_s_ < 0) start_s_ = now_s;
+  last_frame_s_ = now_s;
   TakeReplies(now_s);
   if (phase_ == Phase::kDone) return;
   if (!tree_) {
@@ -434,11 +445,21 @@ void Client::Frame(double now_s, bool is_late) {
       options_.select, view, [this](Tile& tile) { tree_->AddChildren(tile); }, frame_, tree_->root(), selection);
   FrameRecord record = Describe(selection, view);
   record.is_late = is_late;
-  StartLoads(selection);
+  StartLoads(selection, now_s);
   Unload(frame_);
   statistics_.AddFrame(now_s, record);
   if (number_ == 0 && frame_ % kTrackPeriod == 1) statistics_.AddCamera(pose.position);
   Advance(record, now_s);
+}
+
+void Client::Finish() {
+  if (!tree_) return;
+  ForEachTile(tree_->root(), [this](const Tile& tile) {
+    if (tile.content != Content::kMesh) return;
+    if (tile.state == LoadState::kFailed) return statistics_.AddFailedTile();
+    if (!tile.in_flight && tile.attempts.all == 0) return;
+    statistics_.AddOpenTile(tile.attempts.seconds + (tile.in_flight ? last_frame_s_ - tile.sent_s : 0));
+  });
 }
 
 }  // namespace terrace::fly

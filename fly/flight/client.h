@@ -22,6 +22,9 @@ class Client {
   // period after its due time. One thread at a time.
   void Frame(double now_s, bool is_late);
 
+  // Counts the tiles that were requested and have not arrived until the last frame. Call it once, after that frame.
+  void Finish();
+
   Phase phase() const { return phase_; }
 
  private:
@@ -61,8 +64,8 @@ class Client {
   double PauseFor(const DecodedReply& decoded, const Attempts& attempts) const;
   void CheckVersion(const DecodedReply& decoded, double now_s);
   void WakeWaiting(double now_s);
-  void StartLoads(const Selection& selection);
-  void StartLoad(Tile& tile);
+  void StartLoads(const Selection& selection, double now_s);
+  void StartLoad(Tile& tile, double now_s);
   void Unload(std::uint64_t frame);
   FrameRecord Describe(const Selection& selection, const View& view);
   void Advance(const FrameRecord& record, double now_s);
@@ -79,7 +82,7 @@ class Client {
 
   Phase phase_ = Phase::kOpening;
   ClientRecord record_;
-  double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0;
+  double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0, last_frame_s_ = 0;
   bool is_document_requested_ = false;
   double document_due_s_ = 0;
   Attempts document_attempts_;

@@ -63,6 +63,8 @@ void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
     if (SecondsSince(start) < static_cast<double>(second + 1)) continue;
     each_second(second++);
   }
+  threads.clear();
+  for (const auto& client : clients) client->Finish();
 }
 
 }  // namespace terrace::fly

@@ -123,6 +123,16 @@ void Statistics::AddLoadedTile(const geo::TileKey& key) {
   if (record_.loaded_tiles.size() < kMaxTiles) record_.loaded_tiles.insert({key.level, key.x, key.y});
 }
 
+void Statistics::AddFailedTile() {
+  const std::lock_guard lock(mutex_);
+  ++record_.totals.failed_tiles;
+}
+
+void Statistics::AddOpenTile(double waited_s) {
+  const std::lock_guard lock(mutex_);
+  record_.totals.open_s.Add(waited_s);
+}
+
 void Statistics::AddUrl(std::string url) {
   const std::lock_guard lock(mutex_);
   record_.urls.push_back(std::move(url));

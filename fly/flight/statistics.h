@@ -54,7 +54,7 @@ struct RequestRecord {
   CacheTier tier = CacheTier::kUnknown;
   bool is_tile = true;  // not a document or subtree
   bool opened_connection = false;
-  double seconds = 0;
+  double seconds = 0;  // from the first request of a tile, while the client asked for it and paused
   std::uint64_t bytes = 0;
   std::uint32_t triangles = 0;
   bool is_incomplete = false;  // the triangles do not cover the tile's rectangle
@@ -105,7 +105,10 @@ struct Totals {
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
   double worst_hole = 0;  // share of the screen
   double worst_px = 0, worst_stated_px = 0;
-  ValueCounts latencies_s, frame_worst_px;  // of tiles; of flying frames
+  ValueCounts latencies_s;         // of tiles that arrived
+  std::uint64_t failed_tiles = 0;  // at the end
+  ValueCounts open_s;              // how long the tiles were waited for that had neither arrived nor failed at the end
+  ValueCounts frame_worst_px;      // of flying frames that drew a mesh
   std::map<int, std::uint64_t> tiles_by_level;
   // How often each failure and version change occurred. After 50 texts, failures with new ones are "other messages".
   std::map<std::string, std::uint64_t> messages;
@@ -130,6 +133,8 @@ class Statistics {
   void AddRequest(double now_s, const RequestRecord& record);
   void AddFrame(double now_s, const FrameRecord& record);
   void AddLoadedTile(const geo::TileKey& key);
+  void AddFailedTile();
+  void AddOpenTile(double waited_s);
   void AddUrl(std::string url);
   void AddRetry();
   void AddVersionChange(double now_s, const std::string& from, const std::string& to);

@@ -6,12 +6,20 @@
 
 namespace terrace::fly {
 
-void ValueCounts::Add(double value) {
+void ValueCounts::Add(double value, std::uint64_t times) {
+  if (times == 0) return;
   constexpr std::uint32_t kDropped = 0xFFF;  // the last 12 of the 23 bits of a float's fraction
   const auto single = static_cast<float>(value);
-  ++counts_[std::bit_cast<float>(std::bit_cast<std::uint32_t>(single) & ~kDropped)];
-  ++size_;
+  counts_[std::bit_cast<float>(std::bit_cast<std::uint32_t>(single) & ~kDropped)] += times;
+  size_ += times;
   largest_ = std::max(largest_, single);
+}
+
+void ValueCounts::AddAbove(double limit, const ValueCounts& other) {
+  for (auto i = other.counts_.upper_bound(static_cast<float>(limit)); i != other.counts_.end(); ++i) {
+    Add(i->first, i->second);
+  }
+  if (other.largest_ > limit) largest_ = std::max(largest_, other.largest_);
 }
 
 double ValueCounts::Percentile(double share) const {

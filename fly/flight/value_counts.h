@@ -10,8 +10,10 @@ namespace terrace::fly {
 // microsecond and an hour, or between a thousandth of a pixel and 10,000 pixels.
 class ValueCounts {
  public:
-  // `value`: not negative.
-  void Add(double value);
+  // `value`: not negative; infinity is allowed.
+  void Add(double value, std::uint64_t times = 1);
+  // Adds the values of `other` that are above `limit`.
+  void AddAbove(double limit, const ValueCounts& other);
 
   std::uint64_t size() const { return size_; }
   // The value with index ceil(share * (n - 1)) of the n values in ascending order, 0 <= share <= 1; 0 without values.

@@ -136,7 +136,7 @@ double LatencyMs(const Second& second, double share) {
 TimePlot LatencyPlot(const std::vector<Second>& seconds) {
   return {.title = "Latency of tiles",
           .unit = "ms, logarithmic",
-          .note = "From the request to the last byte.",
+          .note = "From the first request of a tile to the last byte, of those that arrived.",
           .series = {{"p99", "var(--d)", ValuesOf(seconds, [](auto& s) { return LatencyMs(s, 0.99); })},
                      {"p50", "var(--a)", ValuesOf(seconds, [](auto& s) { return LatencyMs(s, 0.5); })}},
           .is_logarithmic = true};

@@ -54,8 +54,9 @@ Json SummaryJson(const Summary& summary) {
   json["bytes"] = totals.bytes;
   json["triangles"] = totals.triangles;
   json["connections"] = totals.connections;
-  json["latency_s"] = {
-      {"p50", Rounded(summary.p50_s)}, {"p99", Rounded(summary.p99_s)}, {"max", Rounded(summary.max_s)}};
+  json["latency_s"] = {{"p50", OrNull(summary.p50_s)}, {"p99", OrNull(summary.p99_s)}, {"max", OrNull(summary.max_s)}};
+  json["failed_tiles"] = totals.failed_tiles;
+  json["open_tiles"] = totals.open_s.size();
   json["cache"] = Counts(totals.tiers, TierKey);
   json["outcomes"] = Counts(totals.outcomes, OutcomeKey);
   json["errors"] = summary.errors;

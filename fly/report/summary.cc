@@ -16,6 +16,8 @@ namespace {
 // for its next tiles in some frames even if the server is fast.
 constexpr double kMaxWaitingShare = 0.25;
 
+constexpr float kNever = std::numeric_limits<float>::infinity();  // the last in order
+
 double Share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -27,8 +29,18 @@ std::string Milliseconds(double seconds) {
                        : fmt::format("{:.1f} s", seconds);
 }
 
+std::string MillisecondsOrNever(double seconds) { return seconds < 0 ? "never" : Milliseconds(seconds); }
+
 // Whether a client loaded tiles, or would have.
 bool IsLoading(const Second& second) { return second.tiles > 0 || second.wanted > 0 || second.in_flight > 0; }
+
+double LatencyOf(const Totals& totals, double share) {
+  ValueCounts all = totals.latencies_s;
+  all.Add(kNever, totals.failed_tiles);
+  all.AddAbove(all.Percentile(share), totals.open_s);
+  const double latency_s = all.Percentile(share);
+  return std::isinf(latency_s) ? -1 : latency_s;
+}
 
 // Tiles per second over the seconds in which at least half of the frames waited for tiles.
 double TilesPerWaitingSecond(const std::vector<Second>& seconds) {
@@ -60,7 +72,12 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
         "waited, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
         "than {}.",
         100 * waiting, TilesPerWaitingSecond(seconds), options.max_loads * options.clients,
-        Milliseconds(summary.p50_s)));
+        MillisecondsOrNever(summary.p50_s)));
+  }
+  if (const double oldest_s = totals.open_s.Percentile(1); oldest_s > totals.latencies_s.Percentile(1)) {
+    findings.push_back(
+        fmt::format("{} tiles had not arrived at the end; one was awaited for {}, longer than any that arrived.",
+                    Grouped(totals.open_s.size()), Milliseconds(oldest_s)));
   }
   if (totals.hole_frames > 0) {
     findings.push_back(fmt::format("Holes: {} of {} examined frames showed nothing in up to {:.1f} % of the screen.",
@@ -99,7 +116,6 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   summary.clients = record.clients;
   const std::vector<Second>& seconds = record.seconds;
   summary.seconds = static_cast<double>(seconds.size());
-  constexpr float kNever = std::numeric_limits<float>::infinity();  // the last in order
   std::vector<float> views;
   bool has_all_arrived = true;  // of those that opened the document
   for (const ClientRecord& client : summary.clients) {
@@ -117,9 +133,9 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   summary.first_view_s = view_at(0.5);
   summary.worst_first_view_s = view_at(1);
   const Totals& totals = summary.totals;
-  summary.p50_s = totals.latencies_s.Percentile(0.5);
-  summary.p99_s = totals.latencies_s.Percentile(0.99);
-  summary.max_s = totals.latencies_s.Percentile(1);
+  summary.p50_s = LatencyOf(totals, 0.5);
+  summary.p99_s = LatencyOf(totals, 0.99);
+  summary.max_s = LatencyOf(totals, 1);
   summary.frame_p50_px = totals.frame_worst_px.Percentile(0.5);
   summary.frame_p99_px = totals.frame_worst_px.Percentile(0.99);
   summary.refined_share = Share(totals.refined_frames, totals.flying_frames);
@@ -160,11 +176,11 @@ std::string TextOf(const Summary& summary) {
   const auto add = [&text](std::string_view name, const std::string& value) {
     fmt::format_to(std::back_inserter(text), "{:<17}{}\n", name, value);
   };
-  const auto seconds_or_never = [](double s) { return s < 0 ? std::string("never") : Milliseconds(s); };
-  add("first full view", summary.clients.size() == 1
-                             ? seconds_or_never(summary.first_view_s)
-                             : fmt::format("{} median, {} worst of {} clients", seconds_or_never(summary.first_view_s),
-                                           seconds_or_never(summary.worst_first_view_s), summary.clients.size()));
+  add("first full view",
+      summary.clients.size() == 1
+          ? MillisecondsOrNever(summary.first_view_s)
+          : fmt::format("{} median, {} worst of {} clients", MillisecondsOrNever(summary.first_view_s),
+                        MillisecondsOrNever(summary.worst_first_view_s), summary.clients.size()));
   add("refined", fmt::format("{:.1f} % of {} frames of the flight; {} after its end", 100 * summary.refined_share,
                              Grouped(totals.flying_frames),
                              summary.arrival_s < 0 ? "not full" : "full " + Milliseconds(summary.arrival_s)));
@@ -178,8 +194,10 @@ std::string TextOf(const Summary& summary) {
                            summary.tiles_per_second, summary.best_tiles_per_second, Grouped(totals.other_requests)));
   add("received", fmt::format("{} bytes, {} triangles, {} connections", Grouped(totals.bytes),
                               Grouped(totals.triangles), Grouped(totals.connections)));
-  add("latency of tiles", fmt::format("p50 {}, p99 {}, at most {}", Milliseconds(summary.p50_s),
-                                      Milliseconds(summary.p99_s), Milliseconds(summary.max_s)));
+  add("latency of tiles",
+      fmt::format("p50 {}, p99 {}, slowest {}; {} failed, {} had not arrived at the end",
+                  MillisecondsOrNever(summary.p50_s), MillisecondsOrNever(summary.p99_s),
+                  MillisecondsOrNever(summary.max_s), Grouped(totals.failed_tiles), Grouped(totals.open_s.size())));
   add("server had them", fmt::format("in memory {}, lower tier {}, joined a build {}, built {}, not stated {}",
                                      Grouped(totals.tiers[0]), Grouped(totals.tiers[1]), Grouped(totals.tiers[2]),
                                      Grouped(totals.tiers[3]), Grouped(totals.tiers[4])));

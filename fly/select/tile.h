@@ -36,7 +36,8 @@ struct ImplicitTree;
 // Requests since the last success.
 struct Attempts {
   int all = 0;
-  int failed = 0;  // without refusals
+  int failed = 0;      // without refusals
+  double seconds = 0;  // that they and the pauses after them took
 };
 
 struct Tile {
@@ -59,6 +60,7 @@ struct Tile {
 
   LoadState state = LoadState::kUnloaded;
   bool in_flight = false;  // a request for it runs
+  double sent_s = 0;       // when it was sent, seconds since the start
   bool waiting = false;    // a request for it failed, and will be repeated after a pause
   bool is_stale = false;   // loaded, but from an older version of the dataset
   Attempts attempts;

@@ -147,6 +147,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(len(refused) + len(pauses), 12)
         self.assertGreaterEqual(len(pauses), 8)  # all were asked again but those that the view did not need any more
         self.assertGreaterEqual(min(pauses), 2)  # and none sooner than it may be
+        self.assertGreaterEqual(summary["latency_s"]["max"], 2, "a latency counts from the first request")
 
     def test_asks_a_busy_document_again(self):
         asked = []

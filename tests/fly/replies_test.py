@@ -35,6 +35,15 @@ class Requests(unittest.TestCase):
         self.assertLessEqual(summary["outcomes"]["timeout"], len(begun), "none is sent again without a trace")
         self.assertEqual(summary["outcomes"]["cut"], 0)
 
+    def test_that_are_never_answered_are_slow(self):
+        with fault_proxy.FaultProxy(flights.UPSTREAM, lambda handler, number: number % 4 == 0 and fault_proxy.silence(handler)) as proxy:
+            status, report = fly(proxy.address, "--first-view-limit", "2", "--require", "errors=0,p99=2s")
+        summary = report["summary"]
+        self.assertEqual(status, 1, summary)
+        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [True, False])
+        self.assertGreater(summary["open_tiles"], 5)
+        self.assertIn("had not arrived at the end", " ".join(summary["findings"]))
+
     def test_have_all_headers(self):
         seen = {}
 
@@ -80,7 +89,7 @@ class TilesThatFail(unittest.TestCase):
             return status, headers, body
 
         with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=lose_a_third) as proxy:
-            status, report = fly(proxy.address, "--first-view-limit", "600", "--require", "full-view=600s,refined=1%", way=REST)
+            status, report = fly(proxy.address, "--first-view-limit", "600", "--require", "full-view=600s,refined=1%,p99=600s", way=REST)
         summary = report["summary"]
         self.assertEqual(status, 1)
         self.assertGreater(summary["tiles"], 40)
@@ -88,7 +97,9 @@ class TilesThatFail(unittest.TestCase):
         self.assertEqual((summary["refined_share"], summary["first_full_view_s"]["worst"], summary["arrival_full_view_s"]), (0, None, None))
         self.assertEqual(summary["clients_without_full_view"], 1)
         self.assertNotIn("keep up", " ".join(summary["findings"]), "it answers at once")
-        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False])
+        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False, False])
+        self.assertIsNone(summary["latency_s"]["p99"], "a third never arrives")
+        self.assertGreater(summary["failed_tiles"], 10)
 
     def test_leave_holes_in_the_tiles_made_of_them(self):
         def lose_a_parent(path, status, headers, body):

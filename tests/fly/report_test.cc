@@ -152,6 +152,33 @@ TEST(Requirements, CountTheSecondsInWhichNoTileArrivedThoughSomeWereWanted) {
   EXPECT_FALSE(Judge(*ParseRequirements("tiles=3.1"), summary).AllHold());
 }
 
+// Slow tiles are not left out because the flight is shorter, and failed ones not because they never arrive.
+TEST(Requirements, CountTilesThatDidNotArriveAmongTheLatencies) {
+  const auto judge = [](int failed, const std::vector<double>& waited_s, const char* requirements) {
+    Statistics statistics(1);
+    RequestRecord tile;
+    tile.seconds = 0.01;
+    for (int i = 0; i < 80; ++i) statistics.AddRequest(0.5, tile);
+    for (int i = 0; i < failed; ++i) statistics.AddFailedTile();
+    for (const double waited : waited_s) statistics.AddOpenTile(waited);
+    const Summary summary = Summarize(SomeOptions(), statistics.record());
+    return std::pair(Judge(*ParseRequirements(requirements), summary).AllHold(), TextOf(summary));
+  };
+  const std::vector<double> young(20, 0.001), old(20, 4.0), most_old(81, 4.0);
+  EXPECT_TRUE(judge(0, {}, "p50=11ms,p99=11ms").first);
+  EXPECT_TRUE(judge(0, young, "p50=11ms,p99=11ms").first) << "open requests at the end are normal";
+  EXPECT_FALSE(judge(0, young, "p50=9ms").first) << "and make the others no faster";
+  EXPECT_EQ(judge(0, young, "").second.find("had not arrived at the end; one"), std::string::npos);
+  EXPECT_TRUE(judge(0, old, "p50=11ms,p99=4s,errors=0").first);
+  EXPECT_FALSE(judge(0, old, "p99=3900ms").first);
+  EXPECT_NE(judge(0, old, "").second.find("20 tiles had not arrived at the end; one was awaited for 4000 ms"),
+            std::string::npos);
+  EXPECT_FALSE(judge(0, most_old, "p50=3900ms").first);
+  EXPECT_TRUE(judge(2, {}, "p50=11ms").first);
+  EXPECT_FALSE(judge(2, {}, "p99=9999s").first) << "2 of 82 never arrive";
+  EXPECT_NE(judge(2, {}, "").second.find("p99 never"), std::string::npos);
+}
+
 TEST(Requirements, HoldOrFail) {
   Statistics statistics(1);
   Fill(statistics);
