@@ -202,7 +202,7 @@ void Client::Take(DecodedReply& decoded, double now_s) {
   if (decoded.resource == Resource::kDocument) return TakeDocument(decoded, now_s);
   if (decoded.outcome != Outcome::kOk) return FailOrWait(decoded, now_s);
   decoded.tile->attempts = {};
-  if (decoded.resource == Resource::kTile) TakeTile(decoded, now_s);
+  if (decoded.resource == Resource::kTile) TakeTile(decoded);
 }
 
 void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
@@ -212,8 +212,11 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
     const bool asks_again = AsksAgain(decoded, document_attempts_);
     document_due_s_ = now_s + PauseFor(decoded, document_attempts_);
     document_problem_ = decoded.message;
+    if (asks_again) {
+      wants_document_ = true;
+      return statistics_.AddRetry();
+    }
     if (tree_) return;
-    if (asks_again) return statistics_.AddRetry();
     return GiveUp(fmt::format("{}: {}", options_.document.PublicText(), decoded.message));
   }
   document_attempts_ = {};
@@ -225,7 +228,11 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
     if (tree_->version() == before) return;
     statistics_.AddVersionChange(now_s, before, tree_->version());
     ++version_;
+    wants_document_ = false;                          // what raised doubts meanwhile were URLs of the older version
     for (Tile* tile : ready_) tile->is_stale = true;  // drawn until the new one is there
+    ForEachTile(tree_->root(), [](Tile& tile) {
+      if (tile.state == LoadState::kFailed) tile.state = LoadState::kUnloaded;
+    });
     return;
   }
   Result<std::unique_ptr<TileTree>> tree =
@@ -238,7 +245,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
   statistics_.SetClient(number_, record_);
 }
 
-void Client::TakeTile(const DecodedReply& decoded, double now_s) {
+void Client::TakeTile(const DecodedReply& decoded) {
   Tile& tile = *decoded.tile;
   tile_bytes_ -= tile.decoded_bytes;
   tree_->TakeContent(tile, decoded.content);
@@ -251,7 +258,7 @@ void Client::TakeTile(const DecodedReply& decoded, double now_s) {
   std::from_chars(stated.data(), stated.data() + stated.size(), tile.stated_error_m);
   if (tile.key) statistics_.AddLoadedTile(*tile.key);
   TakeReady(tile);
-  CheckVersion(decoded, now_s);
+  CheckVersion(decoded);
 }
 
 void Client::TakeReady(Tile& tile) {
@@ -260,13 +267,11 @@ void Client::TakeReady(Tile& tile) {
 }
 
 // terrace answers a URL of another version with the current tile and no-store. Such a reply means that the document has
-// changed.
-void Client::CheckVersion(const DecodedReply& decoded, double now_s) {
-  const bool is_suspect =
-      decoded.outcome == Outcome::kNotFound || decoded.reply.cache_control.find("no-store") != std::string::npos;
-  if (!is_suspect || tree_->version().empty() || is_document_requested_ || now_s < document_due_s_) return;
-  is_document_requested_ = true;
-  SendRequest(Resource::kDocument, nullptr, "");
+// changed. Errors are no-store too; of them only 404 does. URLs of an older version say nothing about this one.
+void Client::CheckVersion(const DecodedReply& decoded) {
+  if (tree_->version().empty() || decoded.version != version_) return;
+  const bool is_current = decoded.reply.cache_control.find("no-store") == std::string::npos;
+  if (decoded.outcome == Outcome::kNotFound || (decoded.outcome == Outcome::kOk && !is_current)) wants_document_ = true;
 }
 
 // Counts an attempt without success. Returns whether another one is due: after refusals without limit.
@@ -289,8 +294,12 @@ double Client::PauseFor(const DecodedReply& decoded, const Attempts& attempts) c
 
 void Client::FailOrWait(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
-  CheckVersion(decoded, now_s);
-  if (!AsksAgain(decoded, tile.attempts)) return Fail(tile);
+  CheckVersion(decoded);
+  if (!AsksAgain(decoded, tile.attempts)) {
+    tile.attempts = {};  // a later version begins anew
+    if (decoded.version == version_) Fail(tile);
+    return;
+  }
   const double pause_s = PauseFor(decoded, tile.attempts);
   tile.attempts.seconds += decoded.reply.seconds + pause_s;
   tile.waiting = true;
@@ -424,18 +433,17 @@ void Client::Frame(double now_s, bool is_late) {
   last_frame_s_ = now_s;
   TakeReplies(now_s);
   if (phase_ == Phase::kDone) return;
-  if (!tree_) {
-    if (now_s - start_s_ > options_.first_view_limit_s) {
-      const std::string& problem = document_problem_;
-      return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.PublicText(),
-                                options_.first_view_limit_s, problem.empty() ? "" : "; ", problem));
-    }
-    if (!is_document_requested_ && now_s >= document_due_s_) {
-      is_document_requested_ = true;
-      SendRequest(Resource::kDocument, nullptr, "");
-    }
-    return;
+  if (!tree_ && now_s - start_s_ > options_.first_view_limit_s) {
+    const std::string& problem = document_problem_;
+    return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.PublicText(),
+                              options_.first_view_limit_s, problem.empty() ? "" : "; ", problem));
   }
+  if (wants_document_ && !is_document_requested_ && now_s >= document_due_s_) {
+    wants_document_ = false;
+    is_document_requested_ = true;
+    SendRequest(Resource::kDocument, nullptr, "");
+  }
+  if (!tree_) return;
   WakeWaiting(now_s);
   const Pose pose = options_.path.PoseAt(FlownSeconds(now_s));
   const View view(pose, options_.lens);

@@ -56,13 +56,13 @@ class Client {
   void TakeReplies(double now_s);
   void Take(DecodedReply& decoded, double now_s);
   void TakeDocument(const DecodedReply& decoded, double now_s);
-  void TakeTile(const DecodedReply& decoded, double now_s);
+  void TakeTile(const DecodedReply& decoded);
   void TakeReady(Tile& tile);
   void FailOrWait(const DecodedReply& decoded, double now_s);
   static void Fail(Tile& tile);
   bool AsksAgain(const DecodedReply& decoded, Attempts& attempts) const;
   double PauseFor(const DecodedReply& decoded, const Attempts& attempts) const;
-  void CheckVersion(const DecodedReply& decoded, double now_s);
+  void CheckVersion(const DecodedReply& decoded);
   void WakeWaiting(double now_s);
   void StartLoads(const Selection& selection, double now_s);
   void StartLoad(Tile& tile, double now_s);
@@ -83,6 +83,7 @@ class Client {
   Phase phase_ = Phase::kOpening;
   ClientRecord record_;
   double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0, last_frame_s_ = 0;
+  bool wants_document_ = true;  // has none, or the dataset may have changed
   bool is_document_requested_ = false;
   double document_due_s_ = 0;
   Attempts document_attempts_;

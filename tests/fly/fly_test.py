@@ -254,10 +254,10 @@ class Faults(unittest.TestCase):
         self.assertIn("layer.json cannot be read", " ".join(report["summary"]["findings"]))
 
     @staticmethod
-    def fly_over_a_change(edit=None, **more):
-        """(exit status, summary) of a flight during which the version becomes 0123456789ab. `edit(document)` may change
-        both versions of layer.json."""
-        changed = threading.Event()
+    def fly_over_a_change(edit=None, is_gone=False, tiles=60, after_s=0, **more):
+        """(exit status, summary) of a flight during which the version becomes 0123456789ab: after some tiles and seconds.
+        `edit(document)` may change both versions of layer.json. `is_gone`: URLs of the old version are not found."""
+        changed, start = threading.Event(), time.monotonic()
 
         def newer(path, status, headers, body):
             if path.split("?")[0].endswith("layer.json"):
@@ -270,10 +270,12 @@ class Faults(unittest.TestCase):
                     edit(document)
                 return status, headers, json.dumps(document).encode()
             is_old = changed.is_set() and "v=0123456789ab" not in path
+            if is_old and is_gone and fault_proxy.TILE.search(path):
+                return 404, {}, b""
             return status, {**headers, "Cache-Control": "no-store" if is_old else "public, max-age=31536000, immutable"}, body
 
         def change(handler, number):
-            if number == 60:
+            if number >= tiles and time.monotonic() - start >= after_s:
                 changed.set()
             return False
 
@@ -288,6 +290,17 @@ class Faults(unittest.TestCase):
         self.assertGreater(summary["mixed_version_frames"], 0)
         self.assertIn("changed its version", " ".join(summary["findings"]))
         self.assertGreaterEqual(summary["tiles"], 100)  # old ones, and all of them again
+
+    def test_fills_the_holes_of_a_version_that_is_gone(self):
+        rest = ["--from", "-84.25,36.3,1500", "--to", "-84.25,36.3,1500"]
+        # At rest all tiles fail before the document may be read again. Later new tiles fail, and the document is read at once.
+        for more in ({"tiles": 20, "way": rest, "duration": "3"}, {"after_s": 3, "duration": "8"}):
+            with self.subTest(**more):
+                status, summary = self.fly_over_a_change(is_gone=True, **more)
+                self.assertEqual((status, summary["version_changes"]), (0, 1), summary)
+                self.assertGreater(summary["outcomes"]["not_found"], 0)
+                self.assertEqual(summary["failed_tiles"], 0, "they are asked for again")
+                self.assertIsNotNone(summary["arrival_full_view_s"])
 
     def test_shows_one_version_when_all_tiles_are_replaced(self):
         def remove_a_column(document):  # below the camera: the client makes these tiles from their parents
