@@ -362,7 +362,6 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   record.phase = phase_;
   record.is_refined = selection.IsRefined();
   record.is_waiting = !selection.IsSettled();
-  record.drawn = selection.drawn.size();
   record.wanted = selection.loads.size() + selection.pending;
   record.is_loaded = !record.is_waiting && record.wanted == 0;
   record.in_flight = static_cast<std::size_t>(active_);
@@ -370,12 +369,16 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   for (const DrawnTile& drawn : selection.drawn) {
     const Tile& tile = *drawn.tile;
     const bool can_refine = !tile.children.empty() || tile.children_unknown;
+    record.drawn += tile.HasMesh() ? 1 : 0;
     if (can_refine) record.worst_px = std::clamp(drawn.error_px, record.worst_px, kWorstPixels);
     if (tile.children_unknown && drawn.error_px >= options_.select.max_error_px) {
       record.is_refined = false;
       record.is_waiting |= tile.state != LoadState::kFailed;
     }
-    const Tile& loaded = tile.content == Content::kUpsampled ? *tile.parent : tile;
+    const Tile& loaded = tile.MeshTile();
+    const bool is_of_level_0 = loaded.key && loaded.key->level == 0;
+    record.sees_data |=
+        tile.HasMesh() && (!is_of_level_0 || can_refine || drawn.error_px < options_.select.max_error_px);
     if (tile.state != LoadState::kReady || loaded.version == 0) continue;
     if (loaded.stated_error_m >= 0 && drawn.distance_m > 0) {
       const double px = view.ErrorInPixels(loaded.stated_error_m, drawn.distance_m);

@@ -108,13 +108,14 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   ++totals.flying_frames;
   totals.refined_frames += record.is_refined ? 1 : 0;
   totals.waiting_frames += record.is_waiting ? 1 : 0;
-  totals.measured_frames += record.coverage ? 1 : 0;
+  totals.data_frames += record.sees_data ? 1 : 0;
+  totals.measured_frames += coverage.rays > 0 ? 1 : 0;
   totals.hole_frames += hole > 0 ? 1 : 0;
   totals.uncovered_frames += coverage.uncovered > 0 ? 1 : 0;
   totals.worst_hole = std::max(totals.worst_hole, hole);
   totals.worst_px = std::max(totals.worst_px, record.worst_px);
   totals.worst_stated_px = std::max(totals.worst_stated_px, record.worst_stated_px);
-  totals.frame_worst_px.Add(record.worst_px);
+  if (record.drawn > 0) totals.frame_worst_px.Add(record.worst_px);
 }
 
 void Statistics::AddLoadedTile(const geo::TileKey& key) {

@@ -66,10 +66,12 @@ struct FrameRecord {
   bool is_waiting = false;  // the picture lacks tiles other than those that have failed
   bool is_loaded = false;   // waits for nothing, and nothing is left to load ahead
   bool is_mixed = false;    // shows tiles of more than one version
+  bool sees_data = false;   // the view asks for more than level 0, or level 0 suffices for it
   bool is_late = false;
   double worst_px = 0;         // of the geometric errors of drawn tiles that can be refined
-  double worst_stated_px = 0;  // of the errors that the server stated
-  std::size_t drawn = 0, wanted = 0, in_flight = 0;
+  double worst_stated_px = 0;  // of the errors that the server stated, at tiles whose volume the camera is not in
+  std::size_t drawn = 0;       // with a mesh
+  std::size_t wanted = 0, in_flight = 0;
   std::optional<Coverage> coverage;  // of some frames
 };
 
@@ -99,8 +101,8 @@ struct Totals {
                 version_changes = 0;
   std::uint64_t incomplete_tiles = 0;
   std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, waiting_frames = 0, late_frames = 0,
-                mixed_frames = 0;
-  // Flying frames whose Coverage was measured; those of them with holes; those where no tile was selected at some
+                mixed_frames = 0, data_frames = 0;
+  // Flying frames whose Coverage has rays; those of them with holes; those where no tile was selected at some
   // point.
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
   double worst_hole = 0;  // share of the screen

@@ -81,7 +81,8 @@ std::string CardsOf(const Summary& summary) {
           summary.worst_first_view_s < 0, html);
   AddCard(fmt::format("{:.1f} %", 100 * summary.refined_share), "of the frames fully refined",
           summary.refined_share < 0.75, html);
-  AddCard(fmt::format("{:.1f} px", summary.frame_p99_px), "worst error on screen in 99 % of the frames", false, html);
+  AddCard(summary.frame_p99_px < 0 ? "not measured" : fmt::format("{:.1f} px", summary.frame_p99_px),
+          "worst error on screen in 99 % of the frames", false, html);
   AddCard(fmt::format("{}", totals.hole_frames),
           fmt::format("frames with holes, of {} examined", totals.measured_frames), totals.hole_frames > 0, html);
   AddCard(Time(summary.p50_s), "p50 of a tile's latency", false, html);

@@ -38,8 +38,8 @@ Json SummaryJson(const Summary& summary) {
   json["refined_share"] = Rounded(summary.refined_share);
   json["late_frames"] = totals.late_frames;
   json["mixed_version_frames"] = totals.mixed_frames;
-  json["screen_error_px"] = {{"p50", Rounded(summary.frame_p50_px)},
-                             {"p99", Rounded(summary.frame_p99_px)},
+  json["screen_error_px"] = {{"p50", OrNull(summary.frame_p50_px)},
+                             {"p99", OrNull(summary.frame_p99_px)},
                              {"max", Rounded(totals.worst_px)},
                              {"stated_max", Rounded(totals.worst_stated_px)}};
   json["holes"] = {{"examined_frames", totals.measured_frames},

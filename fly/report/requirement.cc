@@ -65,7 +65,7 @@ double ValueOf(Measure measure, const Summary& summary) {
     case Measure::kRefined:
       return has_flight ? summary.refined_share : -1;
     case Measure::kScreenError:
-      return has_flight ? summary.frame_p99_px : -1;
+      return summary.frame_p99_px;
     case Measure::kHoles:
       return totals.measured_frames > 0 ? static_cast<double>(totals.hole_frames) : -1;
     case Measure::kErrors:
@@ -82,7 +82,7 @@ double ValueOf(Measure measure, const Summary& summary) {
 
 // With `more` decimals than usual.
 std::string Show(Unit unit, double value, int more) {
-  if (value < 0) return "never";
+  if (value < 0) return unit == Unit::kSeconds ? "never" : "not measured";
   switch (unit) {
     case Unit::kSeconds:
       return value < 1 ? fmt::format("{:.{}f} ms", value * 1000, 1 + more) : fmt::format("{:.{}f} s", value, 2 + more);

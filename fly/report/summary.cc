@@ -66,6 +66,11 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
     findings.push_back(
         fmt::format("{} of {} clients never saw a full view.", summary.never_full, summary.clients.size()));
   }
+  if (summary.is_beside_data) {
+    findings.emplace_back(
+        "The view shows no terrain of the dataset, or only that of level 0. Check the place and the view of --circle, "
+        "--from and --to, or --path: longitude comes first, west and south are negative.");
+  }
   if (const double waiting = Share(totals.waiting_frames, totals.flying_frames); waiting > kMaxWaitingShare) {
     findings.push_back(fmt::format(
         "The server does not keep up: {:.0f} % of the frames of the flight waited for tiles. While frames "
@@ -136,8 +141,11 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   summary.p50_s = LatencyOf(totals, 0.5);
   summary.p99_s = LatencyOf(totals, 0.99);
   summary.max_s = LatencyOf(totals, 1);
-  summary.frame_p50_px = totals.frame_worst_px.Percentile(0.5);
-  summary.frame_p99_px = totals.frame_worst_px.Percentile(0.99);
+  summary.is_beside_data = totals.flying_frames > 0 && totals.data_frames == 0;
+  if (totals.frame_worst_px.size() > 0) {
+    summary.frame_p50_px = totals.frame_worst_px.Percentile(0.5);
+    summary.frame_p99_px = totals.frame_worst_px.Percentile(0.99);
+  }
   summary.refined_share = Share(totals.refined_frames, totals.flying_frames);
   std::uint64_t loading = 0;
   for (const Second& second : seconds) {
@@ -185,9 +193,11 @@ std::string TextOf(const Summary& summary) {
                              Grouped(totals.flying_frames),
                              summary.arrival_s < 0 ? "not full" : "full " + Milliseconds(summary.arrival_s)));
   add("error on screen",
-      fmt::format("{:.1f} px in half of the frames, {:.1f} px in 99 %, {:.1f} px at most; stated by the "
-                  "server {:.1f} px at most",
-                  summary.frame_p50_px, summary.frame_p99_px, totals.worst_px, totals.worst_stated_px));
+      summary.frame_p99_px < 0
+          ? "not measured"
+          : fmt::format("{:.1f} px in half of the frames, {:.1f} px in 99 %, {:.1f} px at most; stated by the "
+                        "server {:.1f} px at most",
+                        summary.frame_p50_px, summary.frame_p99_px, totals.worst_px, totals.worst_stated_px));
   add("holes", fmt::format("{} of {} examined frames, at most {:.2f} % of the screen", totals.hole_frames,
                            totals.measured_frames, 100 * totals.worst_hole));
   add("tiles", fmt::format("{}, {:.1f} a second, {:.0f} in the best second; {} other requests", Grouped(totals.tiles),

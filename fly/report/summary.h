@@ -21,12 +21,13 @@ struct Summary {
   // Until tiles arrived; -1: never. Tiles that failed never did. One that was still waited for at the end counts with
   // the time until then, if that is above the percentile of the others.
   double p50_s = 0, p99_s = 0, max_s = 0;
-  double tiles_per_second = 0;                // mean over the seconds in which tiles arrived, were wanted or in flight
-  double best_tiles_per_second = 0;           // in the best second
-  double refined_share = 0;                   // of the frames of the flight
-  double frame_p50_px = 0, frame_p99_px = 0;  // percentiles of the frames' worst errors
-  std::uint64_t errors = 0;                   // requests that did not end with ok or a refusal
-  std::vector<std::string> findings;          // what is wrong, in sentences
+  double tiles_per_second = 0;       // mean over the seconds in which tiles arrived, were wanted or in flight
+  double best_tiles_per_second = 0;  // in the best second
+  double refined_share = 0;          // of the frames of the flight
+  double frame_p50_px = -1, frame_p99_px = -1;  // percentiles of the frames' worst errors; -1: not measured
+  bool is_beside_data = false;        // no frame of the flight saw more than level 0, though it asked for more
+  std::uint64_t errors = 0;           // requests that did not end with ok or a refusal
+  std::vector<std::string> findings;  // what is wrong, in sentences
 };
 
 struct Judgements;  // requirement.h

@@ -45,7 +45,8 @@ const Tile* ChildAt(const Tile& tile, const GeodeticPoint& point) {
 struct Found {
   const Tile* deepest = nullptr;                   // with a region
   double min_height_m = -1e9, max_height_m = 1e9;  // that the regions of all tiles here share
-  int drawn = 0, ready = 0;
+  int drawn = 0, ready = 0;                        // with a mesh
+  bool is_empty = false;                           // a tile without one is drawn
 };
 
 Found FindAt(const Tile& root, const GeodeticPoint& point, std::uint64_t frame) {
@@ -57,6 +58,10 @@ Found FindAt(const Tile& root, const GeodeticPoint& point, std::uint64_t frame) 
       found.max_height_m = std::min(found.max_height_m, region->max_height_m());
     }
     if (tile->visits[0].frame != frame || tile->visits[0].verdict != Verdict::kRendered) continue;
+    if (!tile->HasMesh()) {
+      found.is_empty = true;
+      continue;
+    }
     ++found.drawn;
     if (tile->state == LoadState::kReady) ++found.ready;
   }
@@ -80,6 +85,7 @@ std::optional<Found> FindOnRay(const View& view, const geo::Vec3& ray, std::uint
   }
   if (IsHiddenByFog(*distance, FogDensity(view.geodetic().height_m))) return std::nullopt;
   if (found.drawn > 0) return found;
+  if (found.is_empty) return std::nullopt;
   // A coarse mesh may have a smaller range of heights than its descendants. Outside of it culling may be right.
   if (height_m < found.min_height_m || height_m > found.max_height_m) return std::nullopt;
   // The tile has children, but none here: the data end.

@@ -14,7 +14,9 @@ Verdict PreviousVerdict(const Tile& tile, std::uint64_t frame) {
 }
 
 bool Selection::IsRefined() const {
-  if (any_kicked || drawn.empty()) return false;
+  const bool has_mesh =
+      std::any_of(drawn.begin(), drawn.end(), [](const DrawnTile& drawn_tile) { return drawn_tile.tile->HasMesh(); });
+  if (any_kicked || !has_mesh) return false;
   return std::all_of(drawn.begin(), drawn.end(),
                      [](const DrawnTile& drawn_tile) { return drawn_tile.tile->state == LoadState::kReady; });
 }

@@ -46,7 +46,7 @@ struct Selection {
   std::uint32_t pending = 0;     // wanted tiles whose load has begun
   bool any_kicked = false;
 
-  // Whether the picture is complete: nothing was kicked, and everything drawn is loaded.
+  // Whether the picture is complete: nothing was kicked, everything drawn is loaded, and some of it is terrain.
   bool IsRefined() const;
   // Whether nothing in the picture waits for a tile: it is complete but for tiles that have failed.
   bool IsSettled() const;

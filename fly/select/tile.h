@@ -71,6 +71,9 @@ struct Tile {
 
   std::array<Visit, 2> visits;  // of this frame and of the one before
 
+  // The tile whose mesh is drawn for it.
+  const Tile& MeshTile() const { return content == Content::kUpsampled ? *parent : *this; }
+  bool HasMesh() const { return MeshTile().content == Content::kMesh; }
   bool NeedsLoad() const { return !in_flight && !waiting && (state == LoadState::kUnloaded || is_stale); }
   bool IsPending() const { return in_flight || waiting; }
   // Whether drawing it leaves no hole that a reply could fill. A tile that has failed is drawn as nothing.

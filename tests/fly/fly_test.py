@@ -55,6 +55,25 @@ class SoundServer(unittest.TestCase):
         self.assertGreater(report["summary"]["screen_error_px"]["stated_max"], 0)
         self.assertLess(report["summary"]["screen_error_px"]["stated_max"], 9999)
 
+    def test_says_that_the_place_is_wrong(self):
+        def without_the_root_of_the_east(path, status, headers, body):
+            if path.split("?")[0].endswith("layer.json"):
+                headers.pop("Content-Encoding", None)
+                document = json.loads(urllib.request.urlopen(f"http://{flights.UPSTREAM}/jacksboro/layer.json", timeout=60).read())
+                document["available"][0] = [{"startX": 0, "startY": 0, "endX": 0, "endY": 0}]
+                body = json.dumps(document).encode()
+            return status, headers, body
+
+        for rewrite in (None, without_the_root_of_the_east):
+            with self.subTest(rewrite=rewrite), fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=rewrite) as proxy:
+                status, report = fly(proxy.address, "--require", "full-view=60s,refined=1%,holes=0,screen-error=1000px",
+                                     way=["--circle", "84.25,36.3,1500,8000"], duration="1")
+                self.assertEqual(status, 1)
+                self.assertGreater(report["summary"]["tiles"], 0)
+                self.assertIn("no terrain of the dataset", " ".join(report["summary"]["findings"]))
+                if rewrite:
+                    self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False] * 4)
+
     def test_takes_the_format_from_the_path_of_the_url(self):
         for path, form in (("a/layer.json?x=tileset.json", "terrain"), ("a/tileset.json?x=layer.json", "3dtiles")):
             _, report = fly("127.0.0.1:1", "--first-view-limit", "0.1", path=path)

@@ -39,6 +39,8 @@ void Fill(Statistics& statistics) {
     frame.is_refined = i != 3;
     frame.coverage = Coverage{.rays = 100, .missing = i == 5 ? 7 : 0};
     frame.worst_px = 10 + i;
+    frame.drawn = 1;
+    frame.sees_data = true;
     statistics.AddFrame(i * 0.3, frame);
     statistics.AddCamera({7 + i * 0.01, 46, 3000});
   }
@@ -177,6 +179,28 @@ TEST(Requirements, CountTilesThatDidNotArriveAmongTheLatencies) {
   EXPECT_TRUE(judge(2, {}, "p50=11ms").first);
   EXPECT_FALSE(judge(2, {}, "p99=9999s").first) << "2 of 82 never arrive";
   EXPECT_NE(judge(2, {}, "").second.find("p99 never"), std::string::npos);
+}
+
+TEST(Requirements, DoNotHoldWhereNoTerrainWasSeen) {
+  Statistics statistics(1);
+  statistics.AddRequest(0, {});
+  FrameRecord frame;
+  frame.coverage = Coverage();
+  statistics.AddFrame(0, frame);
+  const FlightOptions options = SomeOptions();
+  const Summary nothing = Summarize(options, statistics.record());
+  for (const char* text : {"holes=0", "screen-error=9px"}) {
+    const Judgements judgements = Judge(*ParseRequirements(text), nothing);
+    EXPECT_FALSE(judgements.AllHold()) << text;
+    EXPECT_EQ(judgements.all[0].shown, "not measured");
+  }
+  EXPECT_TRUE(nothing.is_beside_data);
+  EXPECT_NE(TextOf(nothing).find("no terrain of the dataset"), std::string::npos);
+  EXPECT_NE(JsonOf(options, nothing, {}, {}).find(R"("p99": null)"), std::string::npos);
+  EXPECT_EQ(HtmlOf(options, nothing, {}, statistics.record()).find("-1.0 px"), std::string::npos);
+  frame.sees_data = true;
+  statistics.AddFrame(0, frame);
+  EXPECT_FALSE(Summarize(options, statistics.record()).is_beside_data);
 }
 
 TEST(Requirements, HoldOrFail) {

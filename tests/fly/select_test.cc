@@ -203,6 +203,21 @@ TEST(Select, ATileThatHasFailedIsMissingAndNotWaitedFor) {
   EXPECT_TRUE(client.selection().IsSettled());
 }
 
+// As where the sign of a longitude is wrong: the root there is not available.
+TEST(Select, APictureWithoutTerrainIsNeitherCompleteNorWaitedFor) {
+  const char* const west =
+      R"({"tiles":["{z}/{x}/{y}.terrain"],"available":[[{"startX":0,"startY":0,"endX":0,"endY":0}]]})";
+  Client client(*MakeLayerTree(west), {}, 1);
+  client.LoadAll(Over(90, 6000, 0));
+  ASSERT_FALSE(client.selection().drawn.empty());
+  EXPECT_FALSE(client.selection().IsRefined());
+  EXPECT_TRUE(client.selection().IsSettled());
+  EXPECT_EQ(client.Measure().rays, 0);
+  client.LoadAll(Over(-90, 6000, 0));
+  EXPECT_TRUE(client.selection().IsRefined());
+  EXPECT_GT(client.Measure().rays, 0);
+}
+
 TEST(Coverage, FindsHolesInMountainsThatCoarseTilesDoNotHave) {
   Client client(FullTree(13), {}, 1);
   client.LoadAll(Over(7, 9000, 0));

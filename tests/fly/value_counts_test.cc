@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -35,6 +36,22 @@ TEST(ValueCounts, HavePercentilesOfSortedValues) {
       EXPECT_LE(counts.CountUpTo(limit), below(limit * (1 + 0x1p-11)));
     }
   }
+}
+
+TEST(ValueCounts, TakeThoseOfOthersAboveALimit) {
+  ValueCounts some, others;
+  for (const double value : {1, 2, 3}) some.Add(value);
+  others.AddAbove(0, some);
+  EXPECT_EQ(others.size(), 3U);
+  others.AddAbove(2, some);
+  EXPECT_EQ(others.size(), 4U);
+  EXPECT_EQ(others.CountUpTo(2), 2U);
+  others.AddAbove(3, some);
+  EXPECT_EQ(others.size(), 4U);
+  others.Add(std::numeric_limits<double>::infinity(), 2);
+  EXPECT_EQ(others.size(), 6U);
+  EXPECT_EQ(others.Percentile(0.6), 3);
+  EXPECT_TRUE(std::isinf(others.Percentile(1)));
 }
 
 TEST(ValueCounts, AreNothingWithoutValues) {

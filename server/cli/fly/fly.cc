@@ -122,7 +122,7 @@ int RunFly(const FlyArguments& arguments) {
       fmt::print("{} {}: {}\n", judgement.holds ? "holds " : "FAILS ", judgement.requirement.text, judgement.shown);
     }
   }
-  const bool has_flown = summary.totals.tiles > 0 && summary.never_opened == 0;
+  const bool has_flown = summary.totals.tiles > 0 && summary.never_opened == 0 && !summary.is_beside_data;
   return FinishOutput(has_flown && written && judgements.AllHold() ? kExitOk : kExitFailure);
 }
 
@@ -134,8 +134,8 @@ void AddFly(CLI::App& app, int& exit_code) {
   fly->group(kCommands);
   fly->footer(
       "Loads the tiles that cesium-native would load on this path, in real time, and prints a line each second.\n"
-      "Exit status 1: a requirement of --require failed, or nothing could be loaded. docs/flying.md explains each "
-      "number.\n\n"
+      "Exit status 1: a requirement of --require failed, or no terrain of the dataset could be seen.\n"
+      "docs/flying.md explains each number.\n\n"
       "Examples:\n"
       "  terrace fly http://127.0.0.1:8080/maui --circle -156.3,20.75,4500,20000 --report maui.html\n"
       "  terrace fly http://127.0.0.1:8080/alps --from 7.6,45.9,5000 --to 8.1,46.6,5000 --format 3dtiles\n"
