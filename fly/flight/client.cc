@@ -63,8 +63,8 @@ std::string Explain(const HttpReply& reply, Outcome outcome, bool is_document) {
   if (reply.failure != Failure::kNone) return fmt::format("{}: {}", NameOf(outcome), reply.detail);
   std::string text = fmt::format("status {}", reply.status);
   if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
-  if (is_document && reply.status / 100 == 3 && !reply.location.empty()) {
-    text += fmt::format("; it moved to {}; give this URL", reply.location);
+  if (is_document && reply.status / 100 == 3 && reply.location) {
+    text += fmt::format("; it moved to {}; give this URL", reply.location->PublicText());
   }
   if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
   return text;

@@ -208,7 +208,7 @@ class HttpClient::Impl {
     reply.retry_after = std::string(message[http::field::retry_after]);
     reply.date = std::string(message[http::field::date]);
     if (const std::string to(message[http::field::location]); !to.empty()) {
-      if (const Result<Url> url = Resolve(call.url, to)) reply.location = url->Text();
+      if (Result<Url> url = Resolve(call.url, to)) reply.location = *std::move(url);
     }
     reply.cache_control = std::string(message[http::field::cache_control]);
     reply.max_error = std::string(message["Terrain-Max-Error"]);

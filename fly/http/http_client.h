@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,9 +41,9 @@ struct HttpReply {
   std::string body;  // as it was sent; see `is_gzip`
   bool is_gzip = false;
   std::string server_timing, retry_after, date, cache_control, max_error;
-  std::string location;     // of a redirect, as an absolute URL
-  std::uint64_t bytes = 0;  // of head and body
-  double seconds = 0;       // from the call of Get to the last byte, connecting included
+  std::optional<Url> location;  // of a redirect
+  std::uint64_t bytes = 0;      // of head and body
+  double seconds = 0;           // from the call of Get to the last byte, connecting included
   bool opened_connection = false;
 };
 

@@ -8,6 +8,25 @@
 #include "engine/core/parse_number.h"
 
 namespace terrace::fly {
+namespace {
+
+// The text of a URL without the values of its query that may be tokens.
+std::string WithoutSecrets(std::string_view text) {
+  constexpr std::size_t kSecretBytes = 16;  // tokens of the server are at least as long
+  const std::size_t query = std::min(text.find('?'), text.size());
+  std::string shown(text.substr(0, query));
+  for (std::size_t at = query; at < text.size();) {
+    const std::size_t end = std::min(text.find('&', at + 1), text.size());
+    const std::size_t value = std::min(text.find('=', at), end - 1) + 1;
+    const bool is_short = end - value < kSecretBytes;
+    shown += text.substr(at, (is_short ? end : value) - at);
+    if (!is_short) shown += "...";
+    at = end;
+  }
+  return shown;
+}
+
+}  // namespace
 
 std::string Url::Text() const {
   const bool is_ipv6 = origin.host.find(':') != std::string::npos;
@@ -16,22 +35,12 @@ std::string Url::Text() const {
   return std::string(origin.is_tls ? "https://" : "http://") + host + (is_default ? "" : ":" + origin.port) + target;
 }
 
-std::string Url::PublicText() const {
-  constexpr std::size_t kSecretBytes = 16;  // tokens of the server are at least as long
-  const std::size_t query = std::min(target.find('?'), target.size());
-  Url shown{origin, target.substr(0, query)};
-  for (std::size_t at = query; at < target.size();) {
-    const std::size_t end = std::min(target.find('&', at + 1), target.size());
-    const std::size_t value = std::min(target.find('=', at), end - 1) + 1;
-    shown.target += end - value < kSecretBytes ? target.substr(at, end - at) : target.substr(at, value - at) + "...";
-    at = end;
-  }
-  return shown.Text();
-}
+std::string Url::PublicText() const { return Url{origin, WithoutSecrets(target)}.Text(); }
 
 Result<Url> ParseUrl(std::string_view text) {
   const auto wrong = [text](std::string_view what) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: {}; give a URL such as http://127.0.0.1:8080/maui", text, what);
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {}; give a URL such as http://127.0.0.1:8080/maui",
+                     WithoutSecrets(text), what);
   };
   Url url;
   std::string_view rest = text;

@@ -25,7 +25,8 @@ struct Url {
   std::string PublicText() const;
 };
 
-// kInvalidArgument if the text is not an http or https URL; the message begins with it.
+// kInvalidArgument if the text is not an http or https URL; the message begins with it, as PublicText
+// shows it.
 Result<Url> ParseUrl(std::string_view text);
 
 // RFC 3986, section 5, for a `reference` with a path. Resolves "./" and "../" at its beginning only.

@@ -58,6 +58,12 @@ TEST(Url, IsShownWithoutSecrets) {
   EXPECT_EQ(shown("http://h/a?token=0123456789abcdef"), "http://h/a?token=...");
   EXPECT_EQ(shown("http://h/a?error=5&token=0123456789abcdef&v=2"), "http://h/a?error=5&token=...&v=2");
   EXPECT_EQ(shown("http://h/a?token=0123456789abcdef=="), "http://h/a?token=...");
+  for (const char* wrong :
+       {"http://[::1/a?token=0123456789abcdef", "http://h:0?token=0123456789abcdef", "h?t=0123456789abcdef"}) {
+    const std::string message = ParseUrl(wrong).error().message;
+    EXPECT_EQ(message.find("0123456789abcdef"), std::string::npos) << message;
+    EXPECT_TRUE(message.starts_with(std::string(wrong).substr(0, std::string(wrong).find('?') + 1))) << message;
+  }
 }
 
 TEST(Url, IsResolvedAgainstADocument) {
