@@ -132,8 +132,10 @@ void Client::Decode(Format format, DecodedReply& decoded) {
   decoded.content = *content;
 }
 
-void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) {
-  Result<Url> url = resource == Resource::kDocument ? Result<Url>(options_.document) : Resolve(options_.document, uri);
+void Client::SendRequest(Resource resource, Tile* tile, const NextRequest& request) {
+  Result<Url> url = resource == Resource::kDocument ? Result<Url>(options_.document)
+                    : request.inherits_query        ? ResolveWithQuery(options_.document, request.uri)
+                                                    : Resolve(options_.document, request.uri);
   if (!url) {
     if (tile != nullptr) Fail(*tile);
     statistics_.AddMessage(url.error().message);
@@ -333,7 +335,7 @@ void Client::StartLoad(Tile& tile, double now_s) {
     return;
   }
   tile.sent_s = now_s;
-  SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request.uri);
+  SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request);
 }
 
 void Client::StartLoads(const Selection& selection, double now_s) {
@@ -444,7 +446,7 @@ void Client::Frame(double now_s, bool is_late) {
   if (wants_document_ && !is_document_requested_ && now_s >= document_due_s_) {
     wants_document_ = false;
     is_document_requested_ = true;
-    SendRequest(Resource::kDocument, nullptr, "");
+    SendRequest(Resource::kDocument, nullptr, {});
   }
   if (!tree_) return;
   WakeWaiting(now_s);

@@ -50,7 +50,7 @@ class Client {
     double due_s;
   };
 
-  void SendRequest(Resource resource, Tile* tile, const std::string& uri);
+  void SendRequest(Resource resource, Tile* tile, const NextRequest& request);
   static void Decode(Format format, DecodedReply& decoded);
   static Outcome OutcomeOf(const HttpReply& reply);
   void TakeReplies(double now_s);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "engine/core/parse_number.h"
 
@@ -25,6 +26,19 @@ std::string WithoutSecrets(std::string_view text) {
   }
   return shown;
 }
+
+// "name=value" each, views of the target.
+std::vector<std::string_view> ParametersOf(std::string_view target) {
+  std::vector<std::string_view> parameters;
+  for (std::size_t at = target.find('?'); at != std::string_view::npos;) {
+    const std::size_t end = target.find('&', at + 1);
+    parameters.push_back(target.substr(at + 1, end - at - 1));
+    at = end;
+  }
+  return parameters;
+}
+
+std::string_view NameOfParameter(std::string_view parameter) { return parameter.substr(0, parameter.find('=')); }
 
 }  // namespace
 
@@ -101,6 +115,22 @@ Result<Url> Resolve(const Url& base, std::string_view reference) {
     url.target = folder + std::string(reference);
   }
   return ParseUrl(url.Text());
+}
+
+Result<Url> ResolveWithQuery(const Url& base, std::string_view reference) {
+  Result<Url> url = Resolve(base, reference);
+  if (!url || url->origin != base.origin) return url;
+  const std::string own = url->target;  // `known` refers to it
+  const std::vector<std::string_view> known = ParametersOf(own);
+  for (const std::string_view parameter : ParametersOf(base.target)) {
+    const bool is_known = std::any_of(known.begin(), known.end(), [parameter](std::string_view other) {
+      return NameOfParameter(other) == NameOfParameter(parameter);
+    });
+    if (is_known || parameter.empty()) continue;
+    url->target += url->target.find('?') == std::string::npos ? '?' : '&';
+    url->target += parameter;
+  }
+  return url;
 }
 
 }  // namespace terrace::fly

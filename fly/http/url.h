@@ -32,4 +32,8 @@ Result<Url> ParseUrl(std::string_view text);
 // RFC 3986, section 5, for a `reference` with a path. Resolves "./" and "../" at its beginning only.
 Result<Url> Resolve(const Url& base, std::string_view reference);
 
+// The same, and parameters of the base's query whose names the reference's query lacks are added, as cesium-native does
+// for tiles. A reference to another origin gets none: a parameter may be a secret.
+Result<Url> ResolveWithQuery(const Url& base, std::string_view reference);
+
 }  // namespace terrace::fly

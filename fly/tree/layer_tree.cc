@@ -137,7 +137,7 @@ class LayerTree : public TileTree {
     Replace(uri, "{x}", std::to_string(tile.key->x));
     Replace(uri, "{y}", std::to_string(tile.key->y));
     Replace(uri, "{version}", layer_.version);
-    return {NextRequest::Kind::kMesh, std::move(uri)};
+    return {NextRequest::Kind::kMesh, std::move(uri), true};
   }
 
   Result<void> TakeSubtree(Tile& /*tile*/, std::string_view /*bytes*/) override { return {}; }

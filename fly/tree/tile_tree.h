@@ -16,8 +16,9 @@ enum class Format { kTerrain, k3dTiles };
 // What to request next for a tile that needs loading.
 struct NextRequest {
   enum class Kind { kNothing, kMesh, kSubtree };
-  Kind kind = Kind::kNothing;  // kNothing: the tile is ready without a request
-  std::string uri;             // relative to the document
+  Kind kind = Kind::kNothing;   // kNothing: the tile is ready without a request
+  std::string uri;              // relative to the document
+  bool inherits_query = false;  // the document's parameters that the URI lacks belong to it, as in cesium-native
 };
 
 class TileTree {

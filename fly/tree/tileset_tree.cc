@@ -168,7 +168,7 @@ class TilesetTree : public TileTree {
 
   NextRequest RequestFor(const Tile& tile) const override {
     if (tile.content != Content::kMesh) return {};
-    if (!tile.tree) return {NextRequest::Kind::kMesh, WithVersion(tile.uri)};
+    if (!tile.tree) return {NextRequest::Kind::kMesh, WithVersion(tile.uri), true};
     const auto subtree = SubtreeOf(tile.local, tile.tree->subtree_levels);
     if (!tile.tree->subtrees.contains(subtree)) {
       const geo::TileKey root{std::get<0>(subtree), std::get<1>(subtree), std::get<2>(subtree)};

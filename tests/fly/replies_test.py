@@ -1,6 +1,7 @@
 """What terrace fly makes of replies and of their absence, over a server of the sample: replies_test.py BINARY SOURCE_DIR."""
 import email.utils
 import json
+import re
 import signal
 import subprocess
 import threading
@@ -79,6 +80,19 @@ class Requests(unittest.TestCase):
             for first, token in ((proxy, None), (elsewhere, "Bearer t")):
                 self.assertEqual(fly(first.address, *options, way=REST)[0], 0)
                 self.assertEqual(seen.pop(elsewhere.address), {token})
+
+
+    def test_of_tiles_have_the_parameters_of_the_document(self):
+        queries = set()
+
+        def note(handler, number):
+            queries.add(handler.path.split("?")[1])
+            return False
+
+        with fault_proxy.FaultProxy(flights.UPSTREAM, note) as proxy:
+            self.assertEqual(fly(proxy.address, path="jacksboro?error=5&extensions=octvertexnormals", way=REST)[0], 0)
+        (query,) = queries
+        self.assertEqual(sorted(re.findall(r"(?:error|extensions)=\w+", query)), ["error=5", "extensions=octvertexnormals"])
 
 
 class TilesThatFail(unittest.TestCase):

@@ -30,6 +30,7 @@ TEST(LayerTree, MakesAllFourChildrenWhereTheServerHasOne) {
   EXPECT_EQ(east.children[2]->content, Content::kMesh);
   EXPECT_EQ(east.children[0]->content, Content::kUpsampled);
   EXPECT_EQ((*tree)->RequestFor(*east.children[2]).uri, "1/2/1.terrain?v=ab12&error=5");
+  EXPECT_TRUE((*tree)->RequestFor(*east.children[2]).inherits_query);
   EXPECT_EQ((*tree)->RequestFor(*east.children[0]).kind, NextRequest::Kind::kNothing);
   // A 2-pixel error of CesiumJS at level 0 is 77,067 m; 8 times that at 16 pixels.
   EXPECT_NEAR(east.geometric_error_m, 8 * 77067.34, 0.1);
@@ -114,6 +115,7 @@ TEST(TilesetTree, GrowsWithItsSubtrees) {
   request = tree.RequestFor(root);
   EXPECT_EQ(request.kind, NextRequest::Kind::kMesh);
   EXPECT_EQ(request.uri, "t/0/0/0.glb?v=aaaa");
+  EXPECT_FALSE(request.inherits_query) << "templates of implicit tilings do not";
   tree.AddChildren(root);
   ASSERT_EQ(root.children.size(), 2U);  // (1, 0) and (1, 1)
   Tile& north_east = *root.children[1];

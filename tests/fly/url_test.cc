@@ -75,5 +75,18 @@ TEST(Url, IsResolvedAgainstADocument) {
   EXPECT_EQ(Resolve(base, "https://cdn/x")->Text(), "https://cdn/x");
 }
 
+TEST(Url, OfATileHasTheDocumentsParametersThatItLacks) {
+  const Url base = *ParseUrl("http://h/a/layer.json?error=5&token=t&&flag");
+  const auto resolved = [&base](const char* reference) { return ResolveWithQuery(base, reference)->Text(); };
+  EXPECT_EQ(resolved("1/2.terrain"), "http://h/a/1/2.terrain?error=5&token=t&flag");
+  EXPECT_EQ(resolved("2.glb?v=1&error=9"), "http://h/a/2.glb?v=1&error=9&token=t&flag");
+  EXPECT_EQ(resolved("http://h:80/x?errors=1"), "http://h/x?errors=1&error=5&token=t&flag");
+  for (const char* elsewhere : {"https://h/x", "http://h:81/x?v=1", "//cdn/x"}) {
+    EXPECT_EQ(ResolveWithQuery(base, elsewhere)->target, Resolve(base, elsewhere)->target);
+  }
+  EXPECT_EQ(ResolveWithQuery(*ParseUrl("http://h/a"), "b?v=1")->target, "/b?v=1");
+  EXPECT_FALSE(ResolveWithQuery(base, "http://[::1/"));
+}
+
 }  // namespace
 }  // namespace terrace::fly
