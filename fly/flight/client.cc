@@ -31,6 +31,7 @@ constexpr double kWorstPixels = 9999;                   // limit: inside a tile'
 constexpr double kFirstPause = 0.5, kLongestPause = 8;  // seconds, where the server names none
 constexpr double kDocumentPause = 2;                    // seconds between two requests for the document
 constexpr int kDamagedAttempts = 2;
+constexpr int kMaxRedirects = 5;  // of a tile; tiles are named relative to the document, which has to be where it is
 
 // 0.75 to 1.25, spread evenly: clients that were refused together do not come back together.
 double Spread(std::uint64_t i) { return 0.75 + 0.5 * std::fmod(static_cast<double>(i) * 0.6180339887498949, 1.0); }
@@ -63,8 +64,9 @@ std::string Explain(const HttpReply& reply, Outcome outcome, bool is_document) {
   if (reply.failure != Failure::kNone) return fmt::format("{}: {}", NameOf(outcome), reply.detail);
   std::string text = fmt::format("status {}", reply.status);
   if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
-  if (is_document && reply.status / 100 == 3 && reply.location) {
-    text += fmt::format("; it moved to {}; give this URL", reply.location->PublicText());
+  if (reply.location) {
+    text += is_document ? fmt::format("; it moved to {}; give this URL", reply.location->PublicText())
+                        : fmt::format("; it is redirected more than {} times", kMaxRedirects);
   }
   if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
   return text;
@@ -150,7 +152,7 @@ void Client::SendRequest(Resource resource, Tile* tile, const NextRequest& reque
   const char* accept = resource == Resource::kDocument             ? kAcceptJson
                        : resource == Resource::kTile && is_terrain ? kAcceptTerrain
                                                                    : "*/*";
-  http_.Get(number_, *std::move(url), accept,
+  http_.Get(number_, *std::move(url), accept, resource == Resource::kDocument ? 0 : kMaxRedirects,
             [inbox = inbox_, &workers = workers_, format = options_.format, resource, tile,
              version = version_](HttpReply reply) {
               auto decoded = std::make_shared<DecodedReply>();

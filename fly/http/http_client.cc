@@ -46,6 +46,7 @@ struct Call {
   int client = 0;
   Url url;
   std::string accept;
+  int max_redirects = 0;
   std::function<void(HttpReply)> done;
   Clock::time_point start;
 };
@@ -61,6 +62,10 @@ Failure FailureOf(const error_code& error) {
 void Fail(HttpReply& reply, Failure failure, const error_code& error) {
   reply.failure = failure;
   reply.detail = error.message();
+}
+
+bool IsRedirect(int status) {
+  return status == 301 || status == 302 || status == 303 || status == 307 || status == 308;
 }
 
 bool IsTlsError(const error_code& error, int reason) {
@@ -207,7 +212,7 @@ class HttpClient::Impl {
     reply.server_timing = std::string(message["Server-Timing"]);
     reply.retry_after = std::string(message[http::field::retry_after]);
     reply.date = std::string(message[http::field::date]);
-    if (const std::string to(message[http::field::location]); !to.empty()) {
+    if (const std::string to(message[http::field::location]); IsRedirect(reply.status) && !to.empty()) {
       if (Result<Url> url = Resolve(call.url, to)) reply.location = *std::move(url);
     }
     reply.cache_control = std::string(message[http::field::cache_control]);
@@ -247,6 +252,14 @@ class HttpClient::Impl {
     HttpReply reply;
     try {
       reply = co_await Fetch(call);
+      for (int hops = 0; hops < call->max_redirects && reply.location; ++hops) {
+        call->url = *reply.location;
+        const std::uint64_t bytes = reply.bytes;
+        const bool opened_connection = reply.opened_connection;
+        reply = co_await Fetch(call);
+        reply.bytes += bytes;
+        reply.opened_connection |= opened_connection;
+      }
     } catch (const std::exception& error) {
       reply.failure = Failure::kMalformed;
       reply.detail = error.what();
@@ -270,11 +283,12 @@ class HttpClient::Impl {
 HttpClient::HttpClient(const HttpOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 HttpClient::~HttpClient() = default;
 
-void HttpClient::Get(int client, Url url, std::string accept, std::function<void(HttpReply)> done) {
+void HttpClient::Get(int client, Url url, std::string accept, int max_redirects, std::function<void(HttpReply)> done) {
   auto call = std::make_shared<Call>();
   call->client = client;
   call->url = std::move(url);
   call->accept = std::move(accept);
+  call->max_redirects = max_redirects;
   call->done = std::move(done);
   call->start = Clock::now();
   impl_->Start(std::move(call));

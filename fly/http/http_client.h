@@ -41,8 +41,8 @@ struct HttpReply {
   std::string body;  // as it was sent; see `is_gzip`
   bool is_gzip = false;
   std::string server_timing, retry_after, date, cache_control, max_error;
-  std::optional<Url> location;  // of a redirect
-  std::uint64_t bytes = 0;      // of head and body
+  std::optional<Url> location;  // of a redirect that was not followed: 301, 302, 303, 307 or 308
+  std::uint64_t bytes = 0;      // of heads and bodies
   double seconds = 0;           // from the call of Get to the last byte, connecting included
   bool opened_connection = false;
 };
@@ -55,8 +55,8 @@ class HttpClient {
   HttpClient& operator=(const HttpClient&) = delete;
 
   // Calls `done` on a thread of this object, exactly once unless this object is destroyed first. Any thread may call
-  // this. Precondition: 0 <= client < options.clients.
-  void Get(int client, Url url, std::string accept, std::function<void(HttpReply)> done);
+  // this. Follows up to `max_redirects` redirects. Precondition: 0 <= client < options.clients.
+  void Get(int client, Url url, std::string accept, int max_redirects, std::function<void(HttpReply)> done);
 
  private:
   class Impl;

@@ -173,6 +173,29 @@ class Replies(unittest.TestCase):
                              {f"document: status 301; it moved to http://{proxy.address}/elsewhere/layer.json?error=5&token=...; give this URL": 1})
             self.assertNotIn("0123456789abcdef", json.dumps(report))
 
+    def test_that_redirect_tiles_are_followed(self):
+        seen = set()
+
+        def note(handler, number):
+            seen.add(handler.headers["Authorization"])
+            return False
+
+        def move(path, status, headers, body):  # each tile four times on this server, then to the other one
+            if not fault_proxy.TILE.search(path):
+                return status, headers, body
+            hops = path.count("hop=")
+            return 302, {"Location": f"{path}&hop={hops}" if hops < 4 else f"http://{elsewhere.address}{path.split('&hop')[0]}"}, b""
+
+        with fault_proxy.FaultProxy(flights.UPSTREAM, note) as elsewhere, fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=move) as proxy:
+            status, report = fly(proxy.address, "--header", "Authorization: Bearer t", "--require", "errors=0,full-view=60s", way=REST)
+        self.assertEqual((status, seen), (0, {None}), report["summary"])
+
+    def test_that_redirect_tiles_without_end_fail(self):
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=lambda path, status, headers, body: (
+                (307, {"Location": path}, b"") if fault_proxy.TILE.search(path) else (status, headers, body))) as proxy:
+            status, report = fly(proxy.address, way=REST, duration="1")
+        self.assertEqual((status, set(report["summary"]["messages"])), (1, {"tile: status 307; it is redirected more than 5 times"}))
+
     def test_with_a_tilejson_are_no_document(self):
         status, report = fly(flights.UPSTREAM, path="jacksboro/tiles.json")
         self.assertEqual(status, 1)
