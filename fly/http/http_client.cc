@@ -128,14 +128,23 @@ class HttpClient::Impl {
       Fail(reply, Failure::kConnect, resolve_error);
       co_return nullptr;
     }
-    auto connection = std::make_unique<Connection>();
-    if (origin.is_tls) {
-      connection->tls = std::make_unique<TlsStream>(strand, tls_);
-    } else {
-      connection->plain = std::make_unique<beast::tcp_stream>(strand);
+    const Clock::time_point deadline = Clock::now() + timeout();
+    std::unique_ptr<Connection> connection;
+    error_code connect_error = asio::error::host_not_found;
+    // Each address has its share of the time: one that does not answer, as of an IPv6 network without a route, does not
+    // hide the next one.
+    for (const auto& entry : endpoints) {
+      connection = std::make_unique<Connection>();
+      if (origin.is_tls) {
+        connection->tls = std::make_unique<TlsStream>(strand, tls_);
+      } else {
+        connection->plain = std::make_unique<beast::tcp_stream>(strand);
+      }
+      connection->lowest().expires_after(timeout() / endpoints.size());
+      auto [error] = co_await connection->lowest().async_connect(entry.endpoint(), kAwait);
+      connect_error = error;
+      if (!error) break;
     }
-    connection->lowest().expires_after(timeout());
-    auto [connect_error, endpoint] = co_await connection->lowest().async_connect(endpoints, kAwait);
     if (connect_error) {
       Fail(reply, connect_error == beast::error::timeout ? Failure::kTimeout : Failure::kConnect, connect_error);
       co_return nullptr;
@@ -147,6 +156,7 @@ class HttpClient::Impl {
       if (options_.verifies_certificates) {
         connection->tls->set_verify_callback(asio::ssl::host_name_verification(origin.host));
       }
+      connection->lowest().expires_at(deadline);
       auto [tls_error] = co_await connection->tls->async_handshake(asio::ssl::stream_base::client, kAwait);
       if (tls_error) {
         if (IsTlsError(tls_error, SSL_R_CERTIFICATE_VERIFY_FAILED)) {
@@ -217,7 +227,8 @@ class HttpClient::Impl {
     }
     reply.cache_control = std::string(message[http::field::cache_control]);
     reply.max_error = std::string(message["Terrain-Max-Error"]);
-    const bool keeps = message.keep_alive();
+    // Bytes after the reply would be taken for the next one.
+    const bool keeps = message.keep_alive() && connection.buffer.size() == 0;
     reply.body = std::move(message.body());
     co_return keeps;
   }

@@ -15,8 +15,9 @@ namespace terrace::fly {
 
 struct HttpOptions {
   int threads = 1;
-  int clients = 1;        // each has connections of its own
-  double timeout_s = 30;  // of connecting to a resolved host, and of a request with its reply
+  int clients = 1;  // each has connections of its own
+  // Of connecting to a resolved host, its addresses share it, and of a request with its reply.
+  double timeout_s = 30;
   // Names and values, in each request to `headers_origin`. A name replaces a header of the client; repeated names are
   // all sent. Other servers do not get them: a document may name tiles anywhere, and a header may be a secret.
   std::vector<std::pair<std::string, std::string>> headers;

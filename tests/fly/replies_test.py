@@ -1,8 +1,10 @@
 """What terrace fly makes of replies and of their absence, over a server of the sample: replies_test.py BINARY SOURCE_DIR."""
+import contextlib
 import email.utils
 import json
 import re
 import signal
+import socket
 import subprocess
 import threading
 import time
@@ -151,6 +153,35 @@ class Replies(unittest.TestCase):
         self.assertEqual((status, summary["outcomes"]["refused"]), (0, 12))
         self.assertGreaterEqual(len(pauses), 8, "all but those that the view did not need any more")
         self.assertGreaterEqual(min(pauses), 3)  # in whole seconds, a 4 can be a 3
+
+    def test_are_not_what_follows_another_one(self):
+        def answer_twice(handler, number):
+            if number % 5 == 0:
+                handler.wfile.write(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\nHTTP/1.1 418 No\r\nContent-Length: 0\r\n\r\n")
+            return number % 5 == 0
+
+        _, summary = fly_with_fault(answer_twice, way=REST)
+        self.assertGreater(summary["outcomes"]["not_found"], 3)
+        self.assertEqual(summary["outcomes"]["other_status"], 0)
+
+    def test_come_from_the_address_that_answers(self):
+        with fault_proxy.FaultProxy(flights.UPSTREAM) as proxy, socket.socket(socket.AF_INET6) as silent:
+            port = int(proxy.address.split(":")[1])
+            try:
+                silent.bind(("::1", port))
+                families = [place[0] for place in socket.getaddrinfo("localhost", port, type=socket.SOCK_STREAM, flags=socket.AI_ADDRCONFIG)]
+            except OSError:
+                families = []
+            if families != [socket.AF_INET6, socket.AF_INET]:
+                self.skipTest("SKIPPED: localhost is not ::1, then 127.0.0.1")
+            silent.listen(0)
+            with contextlib.ExitStack() as stack:
+                for _ in range(2):  # the queue of connections is full: the kernel does not answer others
+                    waiting = stack.enter_context(socket.socket(socket.AF_INET6))
+                    waiting.setblocking(False)
+                    waiting.connect_ex(("::1", port))
+                status, report = fly(f"localhost:{port}", "--timeout", "1", "--loads", "2", "--require", "errors=0", way=REST)
+        self.assertEqual(status, 0, report)
 
     def test_may_follow_informational_ones(self):
         def hint(handler, number):
