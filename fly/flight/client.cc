@@ -243,6 +243,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
       options_.format == Format::kTerrain ? MakeLayerTree(decoded.text) : MakeTilesetTree(decoded.text);
   if (!tree) return GiveUp(fmt::format("{}: {}", options_.document.PublicText(), tree.error().message));
   tree_ = *std::move(tree);
+  if (!tree_->note().empty()) statistics_.AddMessage(fmt::format("document: {}", tree_->note()));
   version_ = 1;
   record_.document_s = now_s - start_s_;
   phase_ = Phase::kFirstView;

@@ -50,7 +50,7 @@ class LevelRanges {
 };
 
 struct Layer {
-  std::string version, tile_template;
+  std::string version, tile_template, note;
   std::vector<LevelRanges> available;
 };
 
@@ -72,21 +72,39 @@ Result<Layer> ParseLayer(std::string_view text) {
                        "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
                        json.at("projection").dump());
     }
-    if (!json.contains("available")) {
+    if (json.value("scheme", Json("tms")) != "tms") {
+      return MakeError(ErrorCode::kInvalidArgument, "layer.json: \"scheme\" is {}; only \"tms\" can be flown over",
+                       json.at("scheme").dump());
+    }
+    if (const Json parent = json.value("parentUrl", Json("")); parent.is_string() && parent != "") {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "layer.json has no \"available\"; availability in metadata of tiles cannot be flown over");
+                       "layer.json has a \"parentUrl\"; fly does not read parent layers, so fly over each layer alone");
     }
     Layer layer;
     layer.version = json.value("version", "");
     layer.tile_template = json.at("tiles").at(0).get<std::string>();
-    for (const Json& level : json.at("available")) {
+    bool has_tiles = false;
+    const Json none;
+    for (const Json& level : json.contains("available") ? json.at("available") : none) {
       std::vector<geo::TileRange> ranges;
       for (const Json& range : level) {
         ranges.push_back({range.at("startX").get<std::int64_t>(), range.at("startY").get<std::int64_t>(),
                           range.at("endX").get<std::int64_t>(), range.at("endY").get<std::int64_t>()});
       }
+      has_tiles |= !ranges.empty();
       layer.available.emplace_back(std::move(ranges));
       if (layer.available.size() > geo::kMaxLevel) break;
+    }
+    if (!has_tiles) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "layer.json lists no tiles in \"available\"; fly needs them there, because it does not read the "
+                       "availability in tiles' metadata");
+    }
+    if (const Json period = json.value("metadataAvailability", Json()); period.is_number_integer() && period > 0) {
+      layer.note = fmt::format(
+          "layer.json has \"metadataAvailability\": {}, so cesium-native finds tiles by the metadata "
+          "of others; this flight uses \"available\" alone",
+          period.dump());
     }
     return layer;
   } catch (const std::exception& error) {
@@ -98,6 +116,7 @@ class LayerTree : public TileTree {
  public:
   explicit LayerTree(Layer layer) : layer_(std::move(layer)) {
     version_ = layer_.version;
+    note_ = layer_.note;
     root_.content = Content::kStructure;
     root_.always_refine = true;
     root_.state = LoadState::kReady;

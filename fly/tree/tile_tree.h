@@ -27,6 +27,8 @@ class TileTree {
 
   Tile& root() { return root_; }
   const std::string& version() const { return version_; }  // empty: the document states none
+  // How the flight differs from that of cesium-native because of the document, for the report; empty: not at all.
+  const std::string& note() const { return note_; }
 
   // Adds the children of a tile that is visited, as far as they are known by now.
   virtual void AddChildren(Tile& tile) = 0;
@@ -53,7 +55,7 @@ class TileTree {
   }
 
   Tile root_;
-  std::string version_;
+  std::string version_, note_;
 };
 
 // kInvalidArgument if the text is no such document; the message says what is missing.

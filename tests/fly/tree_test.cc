@@ -70,15 +70,32 @@ TEST(LayerTree, RequestsNoRootThatIsNotAvailable) {
   EXPECT_EQ(east.children.size(), 4U);
 }
 
+TEST(LayerTree, NotesThatItDoesNotReadTheMetadataOfTiles) {
+  const auto note = [](const std::string& members) {
+    const auto tree =
+        MakeLayerTree(R"({"tiles":["x"],"available":[[{"startX":0,"startY":0,"endX":1,"endY":0}]])" + members + "}");
+    return tree ? (*tree)->note() : tree.error().message;
+  };
+  EXPECT_NE(note(R"(,"metadataAvailability":10)").find("uses \"available\" alone"), std::string::npos);
+  for (const char* without : {"", R"(,"metadataAvailability":0)", R"(,"scheme":"tms","parentUrl":"")"}) {
+    EXPECT_EQ(note(without), "") << without;
+  }
+}
+
 TEST(LayerTree, SaysWhatItCannotRead) {
   const auto message = [](std::string_view text) { return MakeLayerTree(text).error().message; };
   EXPECT_NE(message("<html>").find("layer.json cannot be read"), std::string::npos);
-  EXPECT_NE(message(R"({"tiles":["x"]})").find("no \"available\""), std::string::npos);
+  for (const char* none : {R"({"tiles":["x"]})", R"({"tiles":["x"],"available":[]})",
+                           R"({"tiles":["x"],"available":[[],[]],"metadataAvailability":10})",
+                           R"({"tilejson":"2.1.0","format":"quantized-mesh-1.0","tiles":["x"]})"}) {
+    EXPECT_TRUE(message(none).starts_with("layer.json lists no tiles in \"available\"; fly needs them")) << none;
+  }
+  EXPECT_EQ(message(R"({"scheme":"slippyMap","tiles":["x"]})"),
+            "layer.json: \"scheme\" is \"slippyMap\"; only \"tms\" can be flown over");
+  EXPECT_NE(message(R"({"parentUrl":"./world","tiles":["x"]})").find("has a \"parentUrl\""), std::string::npos);
   EXPECT_NE(message(R"({"projection":"EPSG:3857","tiles":["x"],"available":[]})").find("EPSG:3857"), std::string::npos);
   EXPECT_EQ(message(R"({"tilejson":"3.0.0","format":"png","tiles":["x"]})"),
             "this is the TileJSON of a map; give the URL of a layer.json or tileset.json");
-  EXPECT_NE(message(R"({"tilejson":"2.1.0","format":"quantized-mesh-1.0","tiles":["x"]})").find("no \"available\""),
-            std::string::npos);
   for (const std::string_view other : {std::string_view(kTileset), std::string_view("[1]"), std::string_view("{}")}) {
     EXPECT_EQ(message(other),
               "this is no layer.json: it has no \"tiles\"; give the URL of a layer.json, or fly over a tileset with "
