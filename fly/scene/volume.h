@@ -16,11 +16,13 @@ struct Plane {
   double offset = 0;
 };
 
-struct Rectangle {  // degrees; west <= east
+struct Rectangle {  // degrees; west <= east, so across the antimeridian east is above 180
   double west = 0, south = 0, east = 0, north = 0;
 
+  // -180 <= longitude <= 180
   bool Contains(double longitude, double latitude) const {
-    return latitude >= south && latitude <= north && longitude >= west && longitude <= east;
+    return latitude >= south && latitude <= north &&
+           ((longitude >= west && longitude <= east) || (longitude + 360 >= west && longitude + 360 <= east));
   }
 };
 

@@ -77,8 +77,9 @@ Result<Layer> ParseLayer(std::string_view text) {
                        json.at("scheme").dump());
     }
     if (const Json parent = json.value("parentUrl", Json("")); parent.is_string() && parent != "") {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "layer.json has a \"parentUrl\"; fly does not read parent layers, so fly over each layer alone");
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "layer.json has a \"parentUrl\"; fly does not read parent layers; give the URL of a layer.json without one");
     }
     Layer layer;
     layer.version = json.value("version", "");

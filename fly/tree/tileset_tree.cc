@@ -40,7 +40,9 @@ Volume ParseVolume(const Json& json) {
   if (json.contains("region")) {
     const auto r = json.at("region").get<std::vector<double>>();
     if (r.size() != 6) Fail("a region has not 6 numbers");
-    return Region({geo::ToDegrees(r[0]), geo::ToDegrees(r[1]), geo::ToDegrees(r[2]), geo::ToDegrees(r[3])}, r[4], r[5]);
+    Rectangle rectangle{geo::ToDegrees(r[0]), geo::ToDegrees(r[1]), geo::ToDegrees(r[2]), geo::ToDegrees(r[3])};
+    if (rectangle.east < rectangle.west) rectangle.east += 360;  // across the antimeridian
+    return Region(rectangle, r[4], r[5]);
   }
   if (json.contains("sphere")) {
     const auto s = json.at("sphere").get<std::vector<double>>();
@@ -62,11 +64,12 @@ std::optional<geo::TileKey> KeyOf(const Volume& volume) {
   const int level = static_cast<int>(std::lround(std::log2(180 / side)));
   if (level < 0 || level > geo::kMaxLevel) return std::nullopt;
   const double width = 180.0 / static_cast<double>(geo::TileRows(level));
-  const geo::TileKey key{level, std::llround((r.west + 180) / width), std::llround((r.south + 90) / width)};
+  const std::int64_t columns = geo::TileColumns(level), column = std::llround((r.west + 180) / width) % columns;
+  const geo::TileKey key{level, (column + columns) % columns, std::llround((r.south + 90) / width)};
   const Rectangle exact = RectangleOf(key);
   const double slack = width / 1e6;
-  const bool same = std::abs(exact.west - r.west) < slack && std::abs(exact.south - r.south) < slack &&
-                    std::abs(exact.north - r.north) < slack;
+  const bool same = std::abs(std::remainder(exact.west - r.west, 360)) < slack &&
+                    std::abs(exact.south - r.south) < slack && std::abs(exact.north - r.north) < slack;
   return same ? std::optional(key) : std::nullopt;
 }
 

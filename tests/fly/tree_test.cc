@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -158,6 +159,28 @@ TEST(TilesetTree, DoesNotRequestTheContentOfASubtreesRootThatHasNone) {
   EXPECT_EQ(root.content, Content::kEmpty);
   (*made)->AddChildren(root);
   EXPECT_EQ(root.children.size(), 4U);
+}
+
+// The tiles 6/127/32 and 6/0/32 are side by side there.
+TEST(TilesetTree, DividesARegionAcrossTheAntimeridian) {
+  const double pi = 3.14159265358979323846, side = pi / 64;
+  std::string tileset = kTileset;
+  const std::string region = "0,0,0.7853981633974483,0.7853981633974483";
+  tileset.replace(tileset.find(region), region.size(),
+                  fmt::format("{:.17f},0,{:.17f},{:.17f}", pi - side, -pi + side, 2 * side));
+  auto made = MakeTilesetTree(tileset);
+  ASSERT_TRUE(made) << made.error().message;
+  Tile& root = *(*made)->root().children[0]->children[0]->children[0];
+  ASSERT_TRUE((*made)->TakeSubtree(root, SubtreeBytes(2, {{{0, 0, 0, 0}}, {{0, 0, 1, 1}}, {}})));
+  (*made)->AddChildren(root);
+  ASSERT_EQ(root.children.size(), 4U);
+  EXPECT_FALSE(root.key);
+  EXPECT_EQ(root.children[0]->key, (geo::TileKey{6, 127, 32}));
+  EXPECT_EQ(root.children[1]->key, (geo::TileKey{6, 0, 32}));
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(MeetsVertical(root.children[i]->volume, {179, 1, 0}), i == 0) << i;
+    EXPECT_EQ(MeetsVertical(root.children[i]->volume, {-179, 1, 0}), i == 1) << i;
+  }
 }
 
 TEST(TilesetTree, FillsEachVariableOfATemplate) {

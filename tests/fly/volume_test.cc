@@ -79,6 +79,23 @@ TEST(Volume, ARegionBelowIsItsHeightAway) {
   EXPECT_FALSE(MeetsVertical(region, {r.east + 1, r.south, 5900}));
 }
 
+// From 170 E to 170 W, and the same region with longitudes that do not wrap.
+TEST(Volume, RegionsMayCrossTheAntimeridian) {
+  const Region across({170, -20, 190, 0}, 0, 3000), beside({0, -20, 20, 0}, 0, 3000);
+  for (double longitude = -180; longitude <= 180; longitude += 1) {
+    const GeodeticPoint camera{longitude, -30, 5000};
+    const GeodeticPoint turned{std::remainder(longitude - 170, 360.0), -30, 5000};
+    EXPECT_EQ(MeetsVertical(across, {longitude, -10, 0}), longitude >= 170 || longitude <= -170) << longitude;
+    EXPECT_NEAR(std::sqrt(DistanceSquared(Volume(across), At(camera), camera)),
+                std::sqrt(DistanceSquared(Volume(beside), At(turned), turned)), 1e-3)
+        << longitude;
+    const GeodeticPoint above{longitude, -10, 5000};
+    if (MeetsVertical(across, above)) {
+      EXPECT_NEAR(std::sqrt(DistanceSquared(Volume(across), At(above), above)), 2000, 1e-6) << longitude;
+    }
+  }
+}
+
 TEST(Volume, SpheresAreMeasuredFromTheirSurface) {
   const Volume sphere = Sphere{{7e6, 0, 0}, 1000};
   EXPECT_DOUBLE_EQ(DistanceSquared(sphere, {7e6, 3000, 0}, {}), 2000.0 * 2000.0);
