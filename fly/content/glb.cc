@@ -133,7 +133,13 @@ Result<TileContent> DecodePrimitive(const Json& document, const Json& primitive,
 
 Result<TileContent> DecodeGlb(std::string_view bytes) {
   const std::optional<Chunks> chunks = SplitChunks(bytes);
-  if (!chunks) return Damaged("no binary glTF 2.0, or cut off");
+  if (!chunks) {
+    for (const std::string_view form : {"b3dm", "i3dm", "pnts", "cmpt", "{"}) {
+      if (!bytes.starts_with(form)) continue;
+      return MakeError(ErrorCode::kNotFound, "{} is not supported; fly reads GLB", form == "{" ? "JSON" : form);
+    }
+    return Damaged("no binary glTF 2.0, or cut off");
+  }
   try {
     const Json document = Json::parse(chunks->json);
     TileContent sum;

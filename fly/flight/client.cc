@@ -109,6 +109,7 @@ void Client::Decode(Format format, DecodedReply& decoded) {
   const auto damaged = [&decoded](const Error& error) {
     decoded.outcome = Outcome::kDamaged;
     decoded.message = error.message;
+    decoded.is_unsupported = error.code == ErrorCode::kNotFound;
   };
   std::string& body = decoded.reply.body;
   // Some servers omit Content-Encoding: the first bytes identify gzip as well.
@@ -187,6 +188,7 @@ void Client::Take(DecodedReply& decoded, double now_s) {
     if (!taken) {
       decoded.outcome = Outcome::kDamaged;
       decoded.message = taken.error().message;
+      decoded.is_unsupported = taken.error().code == ErrorCode::kNotFound;
     }
   }
   RequestRecord record;
@@ -285,7 +287,7 @@ bool Client::AsksAgain(const DecodedReply& decoded, Attempts& attempts) const {
   if (decoded.outcome == Outcome::kRefused) return true;
   ++attempts.failed;
   const int limit = decoded.outcome == Outcome::kDamaged ? kDamagedAttempts : options_.max_attempts;
-  return IsTransient(decoded.reply, decoded.outcome) && attempts.failed < limit;
+  return !decoded.is_unsupported && IsTransient(decoded.reply, decoded.outcome) && attempts.failed < limit;
 }
 
 double Client::PauseFor(const DecodedReply& decoded, const Attempts& attempts) const {

@@ -38,8 +38,9 @@ class Client {
     HttpReply reply;
     Outcome outcome = Outcome::kOk;
     TileContent content;
-    std::string text;     // of a document or subtree
-    std::string message;  // what is wrong with it
+    std::string text;             // of a document or subtree
+    std::string message;          // what is wrong with it
+    bool is_unsupported = false;  // fly has no reader for its form
   };
   struct Inbox {
     std::mutex mutex;

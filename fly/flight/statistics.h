@@ -112,7 +112,8 @@ struct Totals {
   ValueCounts open_s;              // how long the tiles were waited for that had neither arrived nor failed at the end
   ValueCounts frame_worst_px;      // of flying frames that drew a mesh
   std::map<int, std::uint64_t> tiles_by_level;
-  // How often each failure, version change and note on the document occurred. After 50 texts, failures with new ones are "other messages".
+  // How often each failure, version change and note on the document occurred. After 50 texts, failures with new ones
+  // are "other messages".
   std::map<std::string, std::uint64_t> messages;
 };
 

@@ -2,7 +2,7 @@
 
 #include <exception>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <utility>
 
 #include "engine/core/bytes.h"
 #include "fly/scene/json_reason.h"
@@ -26,22 +26,28 @@ std::size_t Morton(std::uint32_t x, std::uint32_t y) {
 
 std::size_t TilesAbove(int level) { return ((std::size_t{1} << (2 * level)) - 1) / 3; }
 
-std::optional<std::string_view> BitsOf(const Json& json, const Json& availability, std::string_view binary) {
-  const Json& view = json.at("bufferViews").at(availability.at("bitstream").get<std::size_t>());
-  const Json& buffer = json.at("buffers").at(view.at("buffer").get<std::size_t>());
-  if (buffer.contains("uri")) return std::nullopt;
-  const auto offset = view.value("byteOffset", std::size_t{0}), length = view.at("byteLength").get<std::size_t>();
-  if (offset > binary.size() || binary.size() - offset < length) return std::nullopt;
-  return binary.substr(offset, length);
-}
-
 tl::unexpected<Error> Damaged(std::string_view what) {
   return MakeError(ErrorCode::kInvalidArgument, "subtree: {}", what);
+}
+
+tl::unexpected<Error> NotSupported(std::string_view what) {
+  return MakeError(ErrorCode::kNotFound, "subtree: {} not supported; fly reads binary subtrees with their bits inside",
+                   what);
+}
+
+Result<std::string_view> BitsOf(const Json& json, const Json& availability, std::string_view binary) {
+  const Json& view = json.at("bufferViews").at(availability.at("bitstream").get<std::size_t>());
+  const Json& buffer = json.at("buffers").at(view.at("buffer").get<std::size_t>());
+  if (buffer.contains("uri")) return NotSupported("buffers in other files are");
+  const auto offset = view.value("byteOffset", std::size_t{0}), length = view.at("byteLength").get<std::size_t>();
+  if (offset > binary.size() || binary.size() - offset < length) return Damaged("its bits are cut off");
+  return binary.substr(offset, length);
 }
 
 }  // namespace
 
 Result<Subtree3d> Subtree3d::Parse(std::string_view bytes, int levels) {
+  if (bytes.starts_with("{")) return NotSupported("JSON is");
   ByteReader reader(bytes);
   const bool is_binary = reader.Get<std::uint32_t>() == kMagic && reader.Get<std::uint32_t>() == 1;
   const auto json_bytes = reader.Get<std::uint64_t>(), binary_bytes = reader.Get<std::uint64_t>();
@@ -51,26 +57,29 @@ Result<Subtree3d> Subtree3d::Parse(std::string_view bytes, int levels) {
   const std::string_view text = reader.GetBytes(json_bytes), binary = reader.GetBytes(binary_bytes);
   try {
     const Json json = Json::parse(text);
-    const auto read = [&](const Json& availability, std::size_t bits) -> std::optional<Bits> {
+    const auto read = [&](const Json& availability, std::size_t bits) -> Result<Bits> {
       Bits result;
       if (availability.contains("constant")) {
         result.constant = availability.at("constant").get<int>() != 0;
         return result;
       }
-      const std::optional<std::string_view> stream = BitsOf(json, availability, binary);
-      if (!stream || stream->size() < (bits + 7) / 8) return std::nullopt;
+      const Result<std::string_view> stream = BitsOf(json, availability, binary);
+      if (!stream) return tl::unexpected(stream.error());
+      if (stream->size() < (bits + 7) / 8) return Damaged("it has fewer bits than tiles");
       result.bytes.assign(stream->begin(), stream->end());
       return result;
     };
-    const Json& contents = json.at("contentAvailability");
-    const std::optional<Bits> tiles = read(json.at("tileAvailability"), TilesAbove(levels));
-    const std::optional<Bits> content = read(contents.is_array() ? contents.at(0) : contents, TilesAbove(levels));
-    const std::optional<Bits> subtrees = read(json.at("childSubtreeAvailability"), std::size_t{1} << (2 * levels));
-    if (!tiles || !content || !subtrees) return Damaged("its bits are cut off, or in another file");
+    const Json contents = json.value("contentAvailability", Json::object({{"constant", 0}}));
+    Result<Bits> tiles = read(json.at("tileAvailability"), TilesAbove(levels));
+    Result<Bits> content = read(contents.is_array() ? contents.at(0) : contents, TilesAbove(levels));
+    Result<Bits> subtrees = read(json.at("childSubtreeAvailability"), std::size_t{1} << (2 * levels));
+    for (const Result<Bits>* part : {&tiles, &content, &subtrees}) {
+      if (!*part) return tl::unexpected(part->error());
+    }
     Subtree3d subtree;
-    subtree.tiles_ = *tiles;
-    subtree.contents_ = *content;
-    subtree.subtrees_ = *subtrees;
+    subtree.tiles_ = *std::move(tiles);
+    subtree.contents_ = *std::move(content);
+    subtree.subtrees_ = *std::move(subtrees);
     return subtree;
   } catch (const std::exception& error) {
     return Damaged(JsonReason(error));

@@ -12,8 +12,8 @@ namespace terrace::fly {
 
 class Subtree3d {
  public:
-  // `levels`: of the tiling's subtrees. kInvalidArgument if the bytes are not a binary subtree of that many levels, or
-  // if its bits are in other files.
+  // `levels`: of the tiling's subtrees. kInvalidArgument if the bytes are not a subtree of that many levels, kNotFound
+  // if fly has no reader for its form: JSON, or bits in other files.
   static Result<Subtree3d> Parse(std::string_view bytes, int levels);
 
   // Availability of the tile (x, y) at `level` below the subtree's root, 0 <= level < levels.

@@ -35,7 +35,8 @@ class TileTree {
 
   virtual NextRequest RequestFor(const Tile& tile) const = 0;
 
-  // Takes the reply to a request of kind kSubtree. kInvalidArgument if it is damaged.
+  // Takes the reply to a request of kind kSubtree. kInvalidArgument if it is damaged, kNotFound if fly has
+  // no reader for its form.
   virtual Result<void> TakeSubtree(Tile& tile, std::string_view bytes) = 0;
 
   // Takes what the tile's content says about its volume.

@@ -1,4 +1,6 @@
 // The tree of a tileset.json: explicit tiles, and below them implicit quadtrees that grow with their subtrees.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -22,8 +24,8 @@
 namespace terrace::fly {
 
 struct ImplicitTree {
-  std::string content_uri, subtree_uri;
-  int subtree_levels = 1;
+  std::string content_uri, subtree_uri;  // content_uri: empty if no tile has content
+  int subtree_levels = 1, available_levels = 1;
   Region region;
   std::map<std::tuple<int, std::int64_t, std::int64_t>, Subtree3d> subtrees;  // by level, x, y of their roots
 };
@@ -32,9 +34,22 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kMaxDepth = 64;  // of explicit tiles
+constexpr int kMaxDepth = 64;   // of explicit tiles
+constexpr int kMaxLevels = 31;  // of an implicit tiling: columns and rows have 32 bits
+constexpr int kMaxSubtreeLevels = 12;
 
 [[noreturn]] void Fail(const std::string& what) { throw std::runtime_error(what); }
+
+[[noreturn]] void Refuse(const std::string& feature) { Fail("it uses " + feature + ", which fly does not read"); }
+
+// `json`: a tile or a volume.
+void RefuseExtensions(const Json& json) {
+  if (!json.contains("extensions")) return;
+  for (const char* name : {"3DTILES_implicit_tiling", "3DTILES_multiple_contents", "3DTILES_bounding_volume_S2",
+                           "3DTILES_bounding_volume_cylinder"}) {
+    if (json.at("extensions").contains(name)) Refuse(name);
+  }
+}
 
 Volume ParseVolume(const Json& json) {
   if (json.contains("region")) {
@@ -49,6 +64,7 @@ Volume ParseVolume(const Json& json) {
     if (s.size() != 4) Fail("a sphere has not 4 numbers");
     return Sphere{{s[0], s[1], s[2]}, s[3]};
   }
+  if (!json.contains("box")) RefuseExtensions(json);
   const auto b = json.at("box").get<std::vector<double>>();
   if (b.size() != 12) Fail("a box has not 12 numbers");
   return OrientedBox{{b[0], b[1], b[2]}, {geo::Vec3{b[3], b[4], b[5]}, {b[6], b[7], b[8]}, {b[9], b[10], b[11]}}};
@@ -94,17 +110,29 @@ Region PartOf(const Region& root, const geo::TileKey& local) {
   return {{west, south, west + width, south + height}, root.min_height_m(), root.max_height_m()};
 }
 
+std::string UriOf(const Json& content) {
+  const bool is_of_1_0 = content.contains("url") && !content.contains("uri");
+  auto uri = content.at(is_of_1_0 ? "url" : "uri").get<std::string>();
+  const std::string path = uri.substr(0, uri.find_first_of("?#"));
+  if (path.ends_with(".json")) Refuse("an external tileset, " + path);
+  return uri;
+}
+
 void AddImplicitRoot(const Json& json, Tile& place) {
   const Json& tiling = json.at("implicitTiling");
   if (tiling.at("subdivisionScheme") != "QUADTREE") Fail("an implicit tiling is no QUADTREE");
   const auto* region = std::get_if<Region>(&place.volume);
   if (region == nullptr) Fail("an implicit tiling without a region");
   auto tree = std::make_shared<ImplicitTree>();
-  tree->content_uri = json.at("content").at("uri").get<std::string>();
+  if (json.contains("content")) tree->content_uri = UriOf(json.at("content"));
   tree->subtree_uri = tiling.at("subtrees").at("uri").get<std::string>();
   tree->subtree_levels = tiling.at("subtreeLevels").get<int>();
-  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tiling.at("availableLevels").get<int>() < 1) {
-    Fail("levels of an implicit tiling");
+  tree->available_levels = tiling.at("availableLevels").get<int>();
+  if (tree->subtree_levels < 1 || tree->subtree_levels > kMaxSubtreeLevels || tree->available_levels < 1 ||
+      tree->available_levels > kMaxLevels) {
+    Fail(fmt::format(
+        "an implicit tiling has \"availableLevels\": {} and \"subtreeLevels\": {}; fly reads 1 to {} and 1 to {}",
+        tree->available_levels, tree->subtree_levels, kMaxLevels, kMaxSubtreeLevels));
   }
   tree->region = *region;
   place.content = Content::kStructure;
@@ -115,19 +143,23 @@ void AddImplicitRoot(const Json& json, Tile& place) {
   root.key = place.key;
   root.geometric_error_m = place.geometric_error_m;
   root.tree = std::move(tree);
-  root.children_unknown = true;
+  root.children_unknown = root.tree->available_levels > 1;
 }
 
 void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile) {
   if (depth > kMaxDepth) Fail("tiles are nested too deeply");
   if (json.contains("transform")) Fail("a tile has a transform, which terrain does not need");
-  if (json.value("refine", "REPLACE") != "REPLACE") Fail("a tile does not REPLACE its parent");
+  if (const std::string refine = json.value("refine", "REPLACE"); refine != "REPLACE" && refine != "replace") {
+    Fail("a tile does not REPLACE its parent");
+  }
+  RefuseExtensions(json);
+  if (json.contains("contents")) Refuse("\"contents\", several for one tile");
   tile.volume = ParseVolume(json.at("boundingVolume"));
   tile.key = KeyOf(tile.volume);
   tile.geometric_error_m = json.at("geometricError").get<double>();
   if (json.contains("implicitTiling")) return AddImplicitRoot(json, tile);
   if (json.contains("content")) {
-    tile.uri = json.at("content").at("uri").get<std::string>();
+    tile.uri = UriOf(json.at("content"));
   } else {
     // Without content. It only groups its children if its error is not below the parent's; else it is drawn as nothing.
     tile.content = Content::kEmpty;
@@ -164,7 +196,7 @@ class TilesetTree : public TileTree {
       const bool is_last = level == tree.subtree_levels;
       // Only its own subtree says whether the root of one has content.
       if (is_last ? found->second.HasSubtree(x, y) : found->second.HasTile(level, x, y)) {
-        AddImplicit(tile, local, is_last || found->second.HasContent(level, x, y));
+        AddImplicit(tile, local, is_last || HasContent(tree, found->second, level, x, y));
       }
     }
   }
@@ -184,7 +216,7 @@ class TilesetTree : public TileTree {
     ImplicitTree& tree = *tile.tree;
     Result<Subtree3d> subtree = Subtree3d::Parse(bytes, tree.subtree_levels);
     if (!subtree) return tl::unexpected(std::move(subtree).error());
-    if (!subtree->HasContent(0, 0, 0)) tile.content = Content::kEmpty;
+    if (!HasContent(tree, *subtree, 0, 0, 0)) tile.content = Content::kEmpty;
     tree.subtrees.insert_or_assign(SubtreeOf(tile.local, tree.subtree_levels), *std::move(subtree));
     return {};
   }
@@ -203,6 +235,11 @@ class TilesetTree : public TileTree {
  private:
   static std::string VersionOf(const Json& json) { return json.at("asset").value("tilesetVersion", ""); }
 
+  static bool HasContent(const ImplicitTree& tree, const Subtree3d& subtree, int level, std::uint32_t x,
+                         std::uint32_t y) {
+    return !tree.content_uri.empty() && subtree.HasContent(level, x, y);
+  }
+
   static void AddImplicit(Tile& parent, const geo::TileKey& local, bool has_content) {
     Tile& tile = AddTile(parent);
     tile.tree = parent.tree;
@@ -210,7 +247,7 @@ class TilesetTree : public TileTree {
     tile.volume = PartOf(parent.tree->region, local);
     tile.key = KeyOf(tile.volume);
     tile.geometric_error_m = parent.geometric_error_m / 2;
-    tile.children_unknown = true;
+    tile.children_unknown = local.level + 1 < tile.tree->available_levels;
     if (has_content) return;
     tile.content = Content::kEmpty;
     tile.state = LoadState::kReady;

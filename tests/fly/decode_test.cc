@@ -80,6 +80,8 @@ TEST(GlbOfClient, RefusesWhatIsNone) {
                                    std::string("glTF\x02\0\0\0\x0c\0\0\0", 12)}) {
     EXPECT_FALSE(DecodeGlb(bytes));
   }
+  EXPECT_EQ(DecodeGlb("b3dm\x01").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(DecodeGlb(R"({"asset":{}})").error().message, "JSON is not supported; fly reads GLB");
   const std::string json = R"({"meshes":[{"primitives":[{"attributes":{"POSITION":7}}]}],"accessors":[]} )";
   std::string glb("glTF\x02\0\0\0", 8);
   const auto put = [&glb](std::uint32_t value) { glb.append(reinterpret_cast<const char*>(&value), 4); };

@@ -113,6 +113,23 @@ std::string SubtreeBytes(int levels, std::vector<std::vector<geo::TileRange>> ti
   return proto::EncodeSubtree(subtree);
 }
 
+// A binary subtree without bits.
+std::string SubtreeOfJson(const std::string& json) {
+  std::string bytes("subt\x01\0\0\0", 8);
+  const auto put = [&bytes](std::uint64_t value) { bytes.append(reinterpret_cast<const char*>(&value), 8); };
+  put(json.size());
+  put(0);
+  return bytes + json;
+}
+
+// Replaces the first `before` of kTileset.
+std::string TilesetWith(const std::string& before, const std::string& after) {
+  std::string tileset = kTileset;
+  return tileset.replace(tileset.find(before), before.size(), after);
+}
+
+Tile& ImplicitRootOf(TileTree& tree) { return *tree.root().children[0]->children[0]->children[0]; }
+
 TEST(TilesetTree, GrowsWithItsSubtrees) {
   auto made = MakeTilesetTree(kTileset);
   ASSERT_TRUE(made) << made.error().message;
@@ -148,13 +165,9 @@ TEST(TilesetTree, DoesNotRequestTheContentOfASubtreesRootThatHasNone) {
   auto made = MakeTilesetTree(kTileset);
   ASSERT_TRUE(made);
   Tile& root = *(*made)->root().children[0]->children[0]->children[0];
-  const std::string json = R"({"tileAvailability":{"constant":1},"contentAvailability":[{"constant":0}],)"
-                           R"("childSubtreeAvailability":{"constant":0}})";
-  std::string bytes("subt\x01\0\0\0", 8);
-  const auto put = [&bytes](std::uint64_t value) { bytes.append(reinterpret_cast<const char*>(&value), 8); };
-  put(json.size());
-  put(0);
-  ASSERT_TRUE((*made)->TakeSubtree(root, bytes + json));
+  ASSERT_TRUE((*made)->TakeSubtree(root, SubtreeOfJson(R"({"tileAvailability":{"constant":1},)"
+                                                       R"("contentAvailability":[{"constant":0}],)"
+                                                       R"("childSubtreeAvailability":{"constant":0}})")));
   EXPECT_EQ((*made)->RequestFor(root).kind, NextRequest::Kind::kNothing);
   EXPECT_EQ(root.content, Content::kEmpty);
   (*made)->AddChildren(root);
@@ -180,6 +193,80 @@ TEST(TilesetTree, DividesARegionAcrossTheAntimeridian) {
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(MeetsVertical(root.children[i]->volume, {179, 1, 0}), i == 0) << i;
     EXPECT_EQ(MeetsVertical(root.children[i]->volume, {-179, 1, 0}), i == 1) << i;
+  }
+}
+
+// Every tile and every subtree is available, as a constant says, but only three levels are.
+TEST(TilesetTree, EndsAtItsLastLevel) {
+  const std::string all = SubtreeOfJson(R"({"tileAvailability":{"constant":1},"contentAvailability":[{"constant":1}],)"
+                                        R"("childSubtreeAvailability":{"constant":1}})");
+  for (const auto& [levels, deepest] : {std::pair("3", 2), std::pair("1", 0), std::pair("31", 30)}) {
+    auto made = MakeTilesetTree(TilesetWith(R"("availableLevels":3)", std::string(R"("availableLevels":)") + levels));
+    ASSERT_TRUE(made) << made.error().message;
+    Tile* tile = &ImplicitRootOf(**made);
+    for (int steps = 0; steps < 40; ++steps) {
+      if ((*made)->RequestFor(*tile).kind == NextRequest::Kind::kSubtree) {
+        ASSERT_TRUE((*made)->TakeSubtree(*tile, all));
+      }
+      EXPECT_EQ((*made)->RequestFor(*tile).kind, NextRequest::Kind::kMesh);
+      (*made)->AddChildren(*tile);
+      if (tile->children.empty()) break;
+      tile = tile->children.back().get();
+    }
+    EXPECT_EQ(tile->local, (geo::TileKey{deepest, (1LL << deepest) - 1, (1LL << deepest) - 1}));
+    EXPECT_FALSE(tile->children_unknown);
+  }
+  for (const char* levels : {"0", "32"}) {
+    EXPECT_FALSE(MakeTilesetTree(TilesetWith(R"("availableLevels":3)", std::string(R"("availableLevels":)") + levels)));
+  }
+}
+
+TEST(TilesetTree, MayHaveNoContent) {
+  const std::string tiles = R"({"tileAvailability":{"constant":1},"childSubtreeAvailability":{"constant":1})";
+  const std::string content = R"("content":{"uri":"t/{level}/{x}/{y}.glb?v=aaaa"},)";
+  // Neither in the subtree nor in the tileset.
+  for (const auto& [tileset, subtree] :
+       {std::pair(std::string(kTileset), tiles + "}"),
+        std::pair(TilesetWith(content, ""), tiles + R"(,"contentAvailability":[{"constant":1}]})")}) {
+    auto made = MakeTilesetTree(tileset);
+    ASSERT_TRUE(made) << made.error().message;
+    Tile& root = ImplicitRootOf(**made);
+    EXPECT_EQ((*made)->RequestFor(root).kind, NextRequest::Kind::kSubtree);
+    const Result<void> taken = (*made)->TakeSubtree(root, SubtreeOfJson(subtree));
+    ASSERT_TRUE(taken) << taken.error().message;
+    (*made)->AddChildren(root);
+    ASSERT_EQ(root.children.size(), 4U);
+    for (const Tile* tile : {&root, root.children[3].get()}) {
+      EXPECT_EQ((*made)->RequestFor(*tile).kind, NextRequest::Kind::kNothing);
+    }
+    (*made)->AddChildren(*root.children[3]);
+    ASSERT_EQ(root.children[3]->children.size(), 4U);
+    EXPECT_EQ((*made)->RequestFor(*root.children[3]->children[0]).kind, NextRequest::Kind::kSubtree);
+  }
+}
+
+TEST(TilesetTree, ReadsTheFormsOf3dTiles1_0) {
+  auto made = MakeTilesetTree(R"({"asset":{"version":"1.0"},"root":{"boundingVolume":{"sphere":[0,0,0,7e6]},
+    "geometricError":1e5,"refine":"replace","content":{"url":"a.glb"}}})");
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ((*made)->RequestFor(*(*made)->root().children[0]).uri, "a.glb");
+}
+
+TEST(TilesetTree, NamesWhatItDoesNotRead) {
+  const std::string region = R"("region":[0,0,0.7853981633974483,0.7853981633974483,-10,900])";
+  for (const auto& [name, tileset] :
+       {std::pair("3DTILES_implicit_tiling",
+                  TilesetWith(R"("implicitTiling":{)", R"("extensions":{"3DTILES_implicit_tiling":{}},"unused":{)")),
+        std::pair("3DTILES_bounding_volume_S2",
+                  TilesetWith(region, R"("extensions":{"3DTILES_bounding_volume_S2":{"token":"1"}})")),
+        std::pair("\"contents\"",
+                  TilesetWith(R"("content":{"uri":"t/{level}/{x}/{y}.glb?v=aaaa"})", R"("contents":[])")),
+        std::pair("an external tileset, t/a.json", TilesetWith("t/{level}/{x}/{y}.glb?v=aaaa", "t/a.json?token=t"))}) {
+    const auto made = MakeTilesetTree(tileset);
+    ASSERT_FALSE(made) << name;
+    EXPECT_TRUE(made.error().message.starts_with(std::string("tileset.json cannot be read: it uses ") + name))
+        << made.error().message;
+    EXPECT_TRUE(made.error().message.ends_with(", which fly does not read"));
   }
 }
 
@@ -248,6 +335,17 @@ TEST(Subtree3d, ReadsTheEncodersBits) {
   for (std::size_t size = 0; size < bytes.size(); ++size)
     EXPECT_FALSE(Subtree3d::Parse(std::string_view(bytes).substr(0, size), 3));
   EXPECT_FALSE(Subtree3d::Parse(bytes, 5));
+}
+
+TEST(Subtree3d, NamesTheFormsThatItDoesNotRead) {
+  const std::string json = R"({"buffers":[{"uri":"a.bin","byteLength":8}],"bufferViews":[{"buffer":0,"byteLength":8}],)"
+                           R"("tileAvailability":{"bitstream":0},"childSubtreeAvailability":{"constant":0}})";
+  for (const std::string& subtree : {json, SubtreeOfJson(json)}) {
+    const Error error = Subtree3d::Parse(subtree, 2).error();
+    EXPECT_EQ(error.code, ErrorCode::kNotFound);
+    EXPECT_NE(error.message.find("not supported"), std::string::npos) << error.message;
+  }
+  EXPECT_EQ(Subtree3d::Parse("<html>", 2).error().code, ErrorCode::kInvalidArgument);
 }
 
 }  // namespace
