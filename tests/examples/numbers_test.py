@@ -6,9 +6,11 @@ import importlib.util
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import threading
 
 client, terrace, source = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 
@@ -19,12 +21,36 @@ def run(*command):
     return done.stdout
 
 
+def complaint(*arguments, reply=None):
+    """(exit status, message) of the C++ example; a server at the port PORT reads a request and sends `reply`."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        def answer():
+            connection, _ = listener.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(reply)
+
+        port = str(listener.getsockname()[1])
+        if reply is None:
+            listener.close()
+        else:
+            threading.Thread(target=answer, daemon=True).start()
+        done = subprocess.run([client, *(port if part == "PORT" else part for part in arguments)], capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stderr
+
+
+assert complaint()[0] == 2 and "HOST PORT PATH" in complaint()[1]
+assert complaint("127.0.0.1", "PORT", "/x")[0] == 1 and "refused" in complaint("127.0.0.1", "PORT", "/x")[1]
+for sent in (b"", b"HTTP", b"\r\n\r\n", b"HTTP/1.1 200 OK\r\n\r\n", b"HTTP/1.1 200 OK\r\n\r\n1234567", b"HTTP/1.1 404 Not Found\r\n\r\n12345678"):
+    status, said = complaint("127.0.0.1", "PORT", "/x", reply=sent)
+    assert status == 1 and said.startswith("no heights, but"), (sent, status, said)
+
 server = subprocess.Popen([terrace, "serve", "--config", source / "config/samples/samples.json", "--listen", "127.0.0.1:0"],
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 try:
     port = re.search(r":(\d+)", server.stdout.readline()).group(1)
     dataset = f"http://127.0.0.1:{port}/jacksboro"
-    in_cpp = run(client, "127.0.0.1", port, "/jacksboro/heights").split()
+    in_cpp = run(client, "localhost", port, "/jacksboro/heights").split()
     in_python = run(sys.executable, source / "examples/binary_heights.py", dataset, "-84.2,36.3", "-84.1,36.4")
     assert in_cpp == re.findall(r"([0-9.]+) m", in_python) == ["375.000", "379.000"], (in_cpp, in_python)
     if importlib.util.find_spec("matplotlib"):
