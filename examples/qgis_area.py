@@ -16,6 +16,10 @@ from qgis.core import (QgsApplication, QgsCoordinateReferenceSystem, QgsCoordina
 from qgis.PyQt.QtCore import QSize
 
 
+# exec in the console has no file; it reads this one from here.
+HERE = pathlib.Path(globals().get("__file__", "examples/qgis_area.py")).parent
+
+
 def layers(dataset, folder, tiles):
     """The mesh of the middle fifth of a dataset, and the raster of its height tiles."""
     server, name = dataset.rsplit("/", 1)
@@ -36,7 +40,7 @@ def layers(dataset, folder, tiles):
 
 def main(dataset="http://127.0.0.1:8080/jacksboro", out=None, tiles=None):
     folder = pathlib.Path(tempfile.mkdtemp())
-    mesh, raster = layers(dataset, folder, tiles or pathlib.Path(__file__).parent / "height_tiles.vrt")
+    mesh, raster = layers(dataset, folder, tiles or HERE / "height_tiles.vrt")
     for layer in (mesh, raster):
         if not layer.isValid():
             sys.exit(f"QGIS cannot read {layer.source()}: {layer.error().message()}")

@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import unittest
+import unittest.mock
 import urllib.request
 
 TERRACE, ROOT = sys.argv[1], pathlib.Path(sys.argv[2])
@@ -139,6 +140,17 @@ class Programs(unittest.TestCase):
         low, high = self.around(lat, lon, 0.0005)
         self.assertTrue(low - 0.1 <= tiles <= high + 0.1, said)
         self.assertGreater(picture.stat().st_size, 10_000)
+
+    def test_the_console_of_qgis_finds_the_height_tiles(self):
+        qgis = unittest.mock.MagicMock()
+        qgis.QgsApplication.instance.return_value = None  # defines the functions alone
+        console = {"__name__": "console"}
+        with unittest.mock.patch.dict(sys.modules, {"qgis": qgis, "qgis.core": qgis, "qgis.PyQt": qgis, "qgis.PyQt.QtCore": qgis}):
+            exec((EXAMPLES / "qgis_area.py").read_text(), console)
+        console["layers"] = unittest.mock.Mock(side_effect=KeyError)
+        self.assertRaises(KeyError, console["main"])
+        _, _, tiles = console["layers"].call_args.args
+        self.assertEqual((ROOT / tiles).resolve(), (EXAMPLES / "height_tiles.vrt").resolve())
 
     def test_blender_draws_an_area(self):
         if not shutil.which("blender"):
