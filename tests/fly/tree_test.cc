@@ -213,7 +213,7 @@ TEST(TilesetTree, EndsAtItsLastLevel) {
       if (tile->children.empty()) break;
       tile = tile->children.back().get();
     }
-    EXPECT_EQ(tile->local, (geo::TileKey{deepest, (1LL << deepest) - 1, (1LL << deepest) - 1}));
+    EXPECT_EQ(tile->local, (geo::TileKey{deepest, (std::int64_t{1} << deepest) - 1, (std::int64_t{1} << deepest) - 1}));
     EXPECT_FALSE(tile->children_unknown);
   }
   for (const char* levels : {"0", "32"}) {
