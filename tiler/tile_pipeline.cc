@@ -106,19 +106,19 @@ Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& datas
   const proto::TileSamples samples{key, heights.lattice, heights.heights};
   const tin::HeightField field = FieldOf(samples);
   tin::GreedyOptions options = RefineOptionsOf(*dataset.model, samples, dataset.mesh_options.criterion);
-  tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(options), known->refinement)
+  tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(options), *known->refinement)
                                           : tin::GreedyTriangulation(field, std::move(options));
   tin::GreedyGoal goal;
   goal.max_error = error_m;
-  // One more than a tile may have, so that a refinement that this limit ended is recognized below.
+  // One more than a tile may have, so that a run that this limit ended has no refinement.
   goal.max_points = proto::kMaxTileVertices + 1;
+  static_assert(tin::Refinement::kMaxVertices == proto::kMaxTileVertices);
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = MicrosecondsSince(start);
-  // Not kept: a refinement with too many vertices, because it has not reached the error; and one that is no better than
-  // what another build has stored meanwhile.
+  // A refinement is not kept if it is no better than what another build has stored meanwhile.
   const RefinedTilePtr other = refinements.FindInMemory(cache_key);
-  if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
+  if (refined->refinement && !(other && other->error_m <= error_m)) {
     refinements.Insert(cache_key, refined);
   }
   return RefinedTilePtr(std::move(refined));

@@ -96,7 +96,7 @@ class GreedyTriangulation::Impl {
   double CurrentError();
   std::size_t vertex_count() const { return triangulation_.vertex_count(); }
   TinMesh Mesh() const { return triangulation_.Mesh(); }
-  Refinement MakeRefinement() const;
+  std::optional<Refinement> MakeRefinement() const;
 
  private:
   struct Insertion {
@@ -281,7 +281,7 @@ double GreedyTriangulation::Impl::CurrentError() {
   return worst == CandidateQueue::kNoSlot ? 0 : static_cast<double>(candidates_.error(worst));
 }
 
-Refinement GreedyTriangulation::Impl::MakeRefinement() const {
+std::optional<Refinement> GreedyTriangulation::Impl::MakeRefinement() const {
   TERRACE_CHECK(recorder_.has_value());
   return recorder_->Make(field_->width(), field_->height());
 }
@@ -437,6 +437,6 @@ bool GreedyTriangulation::Run(const GreedyGoal& goal, std::stop_token stop) { re
 double GreedyTriangulation::CurrentError() const { return impl_->CurrentError(); }
 std::size_t GreedyTriangulation::vertex_count() const { return impl_->vertex_count(); }
 TinMesh GreedyTriangulation::Mesh() const { return impl_->Mesh(); }
-Refinement GreedyTriangulation::MakeRefinement() const { return impl_->MakeRefinement(); }
+std::optional<Refinement> GreedyTriangulation::MakeRefinement() const { return impl_->MakeRefinement(); }
 
 }  // namespace terrace::tin

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -133,8 +134,8 @@ class GreedyTriangulation {
   // Triangles in the order in which they are stored: an insertion reuses the places of those that it removes.
   TinMesh Mesh() const;
 
-  // Everything inserted so far. Precondition: options.record.
-  Refinement MakeRefinement() const;
+  // Everything inserted so far; null if that is more than a refinement may have. Precondition: options.record.
+  std::optional<Refinement> MakeRefinement() const;
 
  private:
   class Impl;

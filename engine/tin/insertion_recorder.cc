@@ -7,8 +7,6 @@
 namespace terrace::tin {
 namespace {
 
-using Wide = InsertionRecord<std::uint32_t>;
-
 // Words of a typical insertion: six triangles, a ring of six vertices, four slots.
 constexpr std::size_t kLikelyWords = 11;
 
@@ -31,22 +29,21 @@ std::size_t SmallestOf(const std::uint32_t* values, std::size_t count) {
 }  // namespace
 
 InsertionRecorder::InsertionRecorder(std::size_t likely_insertions) : made_in_slot_{0, 1} {
-  begun_.removed.assign(2, Wide::kNever);
+  begun_.removed.assign(2, InsertionRecord::kNever);
   made_ = begun_.removed.size();
   inserted_.reserve(likely_insertions);
   errors_before_.reserve(likely_insertions);
   log_.reserve(kLikelyWords * likely_insertions);
 }
 
-InsertionRecorder::InsertionRecorder(const Refinement& refinement) : begun_(refinement.WideRecord()) {
+InsertionRecorder::InsertionRecorder(const Refinement& refinement) : begun_(refinement.record()) {
   inserted_.Append(refinement.inserted());
   errors_before_.Append(refinement.errors_before());
   for (std::uint32_t made = 0; made < begun_.removed.size(); ++made) {
-    if (begun_.removed[made] == Wide::kNever) made_in_slot_.push_back(made);
+    if (begun_.removed[made] == InsertionRecord::kNever) made_in_slot_.push_back(made);
   }
   made_ = begun_.removed.size();
   corners_ = begun_.rings.size();
-  for (const std::uint32_t size : begun_.sizes) max_made_ = std::max<std::size_t>(max_made_, size & ~Wide::kOpen);
 }
 
 void InsertionRecorder::Append(SamplePosition inserted, float error_before, const Star& star) {
@@ -59,35 +56,31 @@ void InsertionRecorder::Append(SamplePosition inserted, float error_before, cons
   if (log_.capacity() - log_.size() < words + kFewest) log_.reserve(2 * (log_.capacity() + words + kFewest));
   log_.GrowBy(words);
   Word* word = log_.end() - words;
-  *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : Wide::kOpen);
+  *word++ = static_cast<Word>(star.count) | (star.is_closed ? 0 : InsertionRecord::kOpen);
   CopyFew(star.ring.ids.data(), corners, word);
   CopyFew(star.triangles.data(), star.removed_count, word + corners);
 }
 
-Refinement InsertionRecorder::Make(int width, int height) const {
-  const bool is_narrow = Refinement::IsNarrow(4 + inserted_.size(), max_made_);
-  return {width,
-          height,
-          {inserted_.begin(), inserted_.end()},
-          {errors_before_.begin(), errors_before_.end()},
-          is_narrow ? Refinement::Record(Finish<std::uint16_t>()) : Refinement::Record(Finish<std::uint32_t>())};
+std::optional<Refinement> InsertionRecorder::Make(int width, int height) const {
+  if (4 + inserted_.size() > Refinement::kMaxVertices || max_made_ > Refinement::kMaxStar) return std::nullopt;
+  return Refinement(width, height, {inserted_.begin(), inserted_.end()}, {errors_before_.begin(), errors_before_.end()},
+                    Finish());
 }
 
-template <typename Index>
-InsertionRecord<Index> InsertionRecorder::Finish() const {
-  using Record = InsertionRecord<Index>;
-  auto record = ConvertTo<Index>(begun_);
+InsertionRecord InsertionRecorder::Finish() const {
+  using Index = InsertionRecord::Index;
+  InsertionRecord record = begun_;
   std::size_t insertion = record.sizes.size(), made = record.removed.size(), corners = record.rings.size();
   record.sizes.resize(inserted_.size());
   record.rings.resize(corners_);
-  record.removed.resize(made_, Record::kNever);
+  record.removed.resize(made_, InsertionRecord::kNever);
   std::vector<std::uint32_t> made_in_slot = made_in_slot_;
   std::size_t slots = made_in_slot.size();
   made_in_slot.resize(slots + 2 * (inserted_.size() - insertion));
   for (const Word* word = log_.begin(); word != log_.end(); ++insertion) {
-    const bool is_open = (*word & Wide::kOpen) != 0;
-    const std::size_t count = *word++ & ~Wide::kOpen, removed = count - (is_open ? 1 : 2);
-    record.sizes[insertion] = static_cast<Index>(is_open ? count | Record::kOpen : count);
+    record.sizes[insertion] = static_cast<Index>(*word);
+    const bool is_open = (*word & InsertionRecord::kOpen) != 0;
+    const std::size_t count = *word++ & Refinement::kMaxStar, removed = count - (is_open ? 1 : 2);
     const Word *const ring = word, *const ring_end = ring + count + (is_open ? 1 : 0);
     // A closed ring may begin anywhere. Its smallest id comes first, so that the record is a function of the
     // insertions.

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "engine/tin/mesh/spare_blocks.h"
@@ -25,26 +26,26 @@ class InsertionRecorder {
   // `star`: of the sample `inserted`. `error_before`: the error before its insertion.
   void Append(SamplePosition inserted, float error_before, const Star& star);
 
-  Refinement Make(int width, int height) const;
+  // Null if the run is larger than a refinement may be.
+  std::optional<Refinement> Make(int width, int height) const;
 
  private:
   using Word = std::uint32_t;
 
-  template <typename Index>
-  InsertionRecord<Index> Finish() const;
+  InsertionRecord Finish() const;
 
   LargeArray<SamplePosition> inserted_;
   LargeArray<float> errors_before_;
 
   // The record before the log, and for each slot the index of the triangle in it.
-  InsertionRecord<std::uint32_t> begun_;
+  InsertionRecord begun_;
   std::vector<std::uint32_t> made_in_slot_;
 
   // For each insertion: the number of triangles made, with InsertionRecord::kOpen; the ring of vertices; the slots of
   // the triangles removed. An insertion removes two triangles fewer than it makes, or one fewer in an open star. The
   // first triangles made take the slots of the removed ones, the others new slots.
   LargeArray<Word> log_;
-  std::size_t made_ = 0, max_made_ = 0;  // triangles, in all and by one insertion
+  std::size_t made_ = 0, max_made_ = 0;  // triangles, in all and by one insertion of the log
   std::size_t corners_ = 0;              // of all rings
 };
 

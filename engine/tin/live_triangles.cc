@@ -14,23 +14,19 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+using Index = InsertionRecord::Index;
+
 // Stars of up to eight triangles, which are nearly all, take one step without branches, which would be mispredicted.
 using Corners = hn::CappedTag<std::uint32_t, 8>;
 
-template <typename Index>
 HWY_INLINE hn::Vec<Corners> LoadIndices(const Index* from) {
-  if constexpr (sizeof(Index) == sizeof(std::uint32_t)) {
-    return hn::LoadU(Corners(), from);
-  } else {
-    return hn::PromoteTo(Corners(), hn::LoadU(hn::Rebind<Index, Corners>(), from));
-  }
+  return hn::PromoteTo(Corners(), hn::LoadU(hn::Rebind<Index, Corners>(), from));
 }
 
 }  // namespace
 
 // Writes to `triangles`, and up to a vector beyond; returns the number of triangles that exist.
-template <typename Index>
-std::size_t CollectStanding(const InsertionRecord<Index>& record, std::size_t insertions,
+std::size_t CollectStanding(const InsertionRecord& record, std::size_t insertions,
                             std::array<std::uint32_t, 3>* triangles) {
   const Corners corners;
   const std::size_t lanes = hn::Lanes(corners);
@@ -45,8 +41,8 @@ std::size_t CollectStanding(const InsertionRecord<Index>& record, std::size_t in
   emit(0, 1, 2);
   emit(2, 3, 0);
   for (std::size_t i = 0; i < insertions; ++i) {
-    const bool is_open = (record.sizes[i] & InsertionRecord<Index>::kOpen) != 0;
-    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord<Index>::kOpen);
+    const bool is_open = (record.sizes[i] & InsertionRecord::kOpen) != 0;
+    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord::kOpen);
     const auto centre = static_cast<std::uint32_t>(4 + i);
     const std::uint32_t last = ring[is_open ? count : 0];
     for (std::size_t k = 0; k < count; k += lanes) {
@@ -72,16 +68,6 @@ std::size_t CollectStanding(const InsertionRecord<Index>& record, std::size_t in
   return static_cast<std::size_t>(out - triangles);
 }
 
-std::size_t CollectNarrow(const InsertionRecord<std::uint16_t>& record, std::size_t insertions,
-                          std::array<std::uint32_t, 3>* triangles) {
-  return CollectStanding(record, insertions, triangles);
-}
-
-std::size_t CollectWide(const InsertionRecord<std::uint32_t>& record, std::size_t insertions,
-                        std::array<std::uint32_t, 3>* triangles) {
-  return CollectStanding(record, insertions, triangles);
-}
-
 }  // namespace HWY_NAMESPACE
 }  // namespace terrace::tin
 HWY_AFTER_NAMESPACE();
@@ -90,28 +76,16 @@ HWY_AFTER_NAMESPACE();
 namespace terrace::tin {
 namespace {
 
-HWY_EXPORT(CollectNarrow);
-HWY_EXPORT(CollectWide);
-
-// A triangulation of v vertices has fewer than 2 v triangles; the rest is padding for writes beyond the last.
-template <typename Record, typename Collect>
-std::vector<std::array<std::uint32_t, 3>> Collected(const Record& record, std::size_t insertions, Collect&& collect) {
-  constexpr std::size_t kMaxLanes = 8;
-  std::vector<std::array<std::uint32_t, 3>> triangles(2 * (insertions + 4) + kMaxLanes);
-  triangles.resize(collect(record, insertions, triangles.data()));
-  return triangles;
-}
+HWY_EXPORT(CollectStanding);
 
 }  // namespace
 
-std::vector<std::array<std::uint32_t, 3>> LiveTriangles(const InsertionRecord<std::uint16_t>& record,
-                                                        std::size_t insertions) {
-  return Collected(record, insertions, HWY_DYNAMIC_DISPATCH(CollectNarrow));
-}
-
-std::vector<std::array<std::uint32_t, 3>> LiveTriangles(const InsertionRecord<std::uint32_t>& record,
-                                                        std::size_t insertions) {
-  return Collected(record, insertions, HWY_DYNAMIC_DISPATCH(CollectWide));
+// A triangulation of v vertices has fewer than 2 v triangles; the rest is padding for writes beyond the last.
+std::vector<std::array<std::uint32_t, 3>> LiveTriangles(const InsertionRecord& record, std::size_t insertions) {
+  constexpr std::size_t kMaxLanes = 8;
+  std::vector<std::array<std::uint32_t, 3>> triangles(2 * (insertions + 4) + kMaxLanes);
+  triangles.resize(HWY_DYNAMIC_DISPATCH(CollectStanding)(record, insertions, triangles.data()));
+  return triangles;
 }
 
 }  // namespace terrace::tin

@@ -3,9 +3,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
-#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -16,8 +14,7 @@
 namespace terrace::tin {
 namespace {
 
-using Wide = InsertionRecord<std::uint32_t>;
-using Narrow = InsertionRecord<std::uint16_t>;
+using Index = InsertionRecord::Index;
 
 constexpr std::string_view kMagic = "terrace refinement 1\n";
 constexpr std::uint32_t kMaxSide = 1U << 16;  // of SamplePosition
@@ -41,19 +38,18 @@ bool GetArray(ByteReader& reader, std::vector<T>& values) {
 
 // Checks that rings consist of earlier vertices and have the stated sizes, and that every insertion removes two
 // triangles fewer than it makes, one fewer on the border.
-template <typename Index>
-bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions) {
+bool IsSoundRecord(const InsertionRecord& record, std::size_t insertions) {
   if (record.sizes.size() != insertions || record.removed.size() < 2) return false;
   std::vector<std::size_t> removed(insertions, 0);
   for (const Index by : record.removed) {
-    if (by == InsertionRecord<Index>::kNever) continue;
+    if (by == InsertionRecord::kNever) continue;
     if (by >= insertions) return false;
     ++removed[by];
   }
   std::size_t ring = 0, made = 2;
   for (std::size_t i = 0; i < insertions; ++i) {
-    const bool is_open = (record.sizes[i] & InsertionRecord<Index>::kOpen) != 0;
-    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord<Index>::kOpen);
+    const bool is_open = (record.sizes[i] & InsertionRecord::kOpen) != 0;
+    const std::size_t count = record.sizes[i] & static_cast<Index>(~InsertionRecord::kOpen);
     const std::size_t vertices = count + (is_open ? 1 : 0);
     if (count == 0 || count != removed[i] + (is_open ? 1 : 2)) return false;
     if (vertices > record.rings.size() - ring || count > record.removed.size() - made) return false;
@@ -71,19 +67,15 @@ bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions)
 
 }  // namespace
 
-bool Refinement::IsNarrow(std::size_t vertices, std::size_t max_triangles_made) {
-  return vertices < Narrow::kNever && max_triangles_made < Narrow::kOpen;
-}
-
 Refinement::Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
-                       Record record)
+                       InsertionRecord record)
     : width_(width),
       height_(height),
       inserted_(std::move(inserted)),
       errors_before_(std::move(errors_before)),
       record_(std::move(record)) {
-  const std::size_t recorded = std::visit([](const auto& of) { return of.sizes.size(); }, record_);
-  TERRACE_CHECK(inserted_.size() == errors_before_.size() && inserted_.size() == recorded);
+  TERRACE_CHECK(inserted_.size() == errors_before_.size() && inserted_.size() == record_.sizes.size());
+  TERRACE_CHECK(vertex_count() <= kMaxVertices);
 }
 
 std::size_t Refinement::PointsAt(double max_error) const {
@@ -100,23 +92,14 @@ TinMesh Refinement::MeshOf(std::size_t points) const {
   mesh.vertices = {{0, 0}, {east, 0}, {east, north}, {0, north}};
   mesh.vertices.insert(mesh.vertices.end(), inserted_.begin(),
                        inserted_.begin() + static_cast<std::ptrdiff_t>(points - 4));
-  mesh.triangles = std::visit([=](const auto& record) { return LiveTriangles(record, points - 4); }, record_);
+  mesh.triangles = LiveTriangles(record_, points - 4);
   return mesh;
 }
 
 std::size_t Refinement::bytes() const {
-  const std::size_t indices = std::visit(
-      [](const auto& record) {
-        return (record.sizes.capacity() + record.rings.capacity() + record.removed.capacity()) *
-               sizeof(record.sizes[0]);
-      },
-      record_);
+  const std::size_t indices = record_.sizes.capacity() + record_.rings.capacity() + record_.removed.capacity();
   return sizeof(Refinement) + inserted_.capacity() * sizeof(SamplePosition) +
-         errors_before_.capacity() * sizeof(float) + indices;
-}
-
-InsertionRecord<std::uint32_t> Refinement::WideRecord() const {
-  return std::visit([](const auto& record) { return ConvertTo<std::uint32_t>(record); }, record_);
+         errors_before_.capacity() * sizeof(float) + indices * sizeof(Index);
 }
 
 // Format: kMagic, width, height, bytes of an index, then five arrays, each preceded by its length, then the hash of all
@@ -127,16 +110,12 @@ std::string Refinement::Serialize() const {
   writer.PutBytes(kMagic);
   writer.Put(static_cast<std::uint32_t>(width_));
   writer.Put(static_cast<std::uint32_t>(height_));
-  std::visit(
-      [&](const auto& record) {
-        writer.Put(static_cast<std::uint32_t>(sizeof(record.sizes[0])));
-        PutArray(writer, inserted_);
-        PutArray(writer, errors_before_);
-        PutArray(writer, record.sizes);
-        PutArray(writer, record.rings);
-        PutArray(writer, record.removed);
-      },
-      record_);
+  writer.Put(std::uint32_t{sizeof(Index)});
+  PutArray(writer, inserted_);
+  PutArray(writer, errors_before_);
+  PutArray(writer, record_.sizes);
+  PutArray(writer, record_.rings);
+  PutArray(writer, record_.removed);
   std::string bytes = writer.Take();
   const std::uint64_t hash = XXH3_64bits(bytes.data(), bytes.size());
   bytes.append(reinterpret_cast<const char*>(&hash), sizeof(hash));
@@ -158,19 +137,11 @@ Result<Refinement> Refinement::Parse(std::string_view bytes) {
   if (width < 2 || height < 2 || width > kMaxSide || height > kMaxSide) return damaged();
   refinement.width_ = static_cast<int>(width);
   refinement.height_ = static_cast<int>(height);
-  const auto index_bytes = reader.Get<std::uint32_t>();
-  if (index_bytes == sizeof(std::uint32_t)) {
-    refinement.record_ = Wide{};
-  } else if (index_bytes != sizeof(std::uint16_t)) {
-    return damaged();
-  }
-  if (!GetArray(reader, refinement.inserted_) || !GetArray(reader, refinement.errors_before_)) return damaged();
-  const bool whole = std::visit(
-      [&](auto& record) {
-        return GetArray(reader, record.sizes) && GetArray(reader, record.rings) && GetArray(reader, record.removed) &&
-               reader.remaining() == 0;
-      },
-      refinement.record_);
+  if (reader.Get<std::uint32_t>() != sizeof(Index)) return damaged();
+  InsertionRecord& record = refinement.record_;
+  const bool whole = GetArray(reader, refinement.inserted_) && GetArray(reader, refinement.errors_before_) &&
+                     GetArray(reader, record.sizes) && GetArray(reader, record.rings) &&
+                     GetArray(reader, record.removed) && reader.remaining() == 0;
   if (!whole || !refinement.IsSound()) return damaged();
   return refinement;
 }
@@ -180,8 +151,8 @@ bool Refinement::IsSound() const {
   for (const SamplePosition sample : inserted_) {
     if (sample.x >= width_ || sample.y >= height_) return false;
   }
-  return inserted_.size() == errors_before_.size() &&
-         std::visit([&](const auto& record) { return IsSoundRecord(record, inserted_.size()); }, record_);
+  return vertex_count() <= kMaxVertices && inserted_.size() == errors_before_.size() &&
+         IsSoundRecord(record_, inserted_.size());
 }
 
 }  // namespace terrace::tin

@@ -4,7 +4,8 @@
 // the largest error was at most E. All meshes of a field are therefore one list of insertions. An insertion is recorded
 // with its sample, the error before it, the ring of vertices that the sample was joined to, and, for each triangle it
 // made, the later insertion that removed this triangle. The mesh after n insertions consists of the triangles made by
-// one of the first n insertions and removed by none of them. Finding them takes no geometry.
+// one of the first n insertions and removed by none of them. Finding them takes no geometry. Indices have 16 bits, so
+// that a refinement stays small: no larger run has one.
 //
 // Immutable; safe to read from many threads at once.
 #pragma once
@@ -13,7 +14,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -24,14 +24,12 @@ namespace terrace::tin {
 
 class Refinement {
  public:
-  using Record = std::variant<InsertionRecord<std::uint16_t>, InsertionRecord<std::uint32_t>>;
-
-  // Whether a record of this size has 16-bit indices, which take half of the memory. Used wherever they suffice.
-  static bool IsNarrow(std::size_t vertices, std::size_t max_triangles_made);
+  static constexpr std::size_t kMaxVertices = InsertionRecord::kNever - 1;
+  static constexpr std::size_t kMaxStar = InsertionRecord::kOpen - 1;  // triangles that one insertion makes
 
   // `errors_before` and the record have one entry per insertion.
   Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,
-             Record record);
+             InsertionRecord record);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -56,8 +54,7 @@ class Refinement {
 
   const std::vector<SamplePosition>& inserted() const { return inserted_; }
   const std::vector<float>& errors_before() const { return errors_before_; }
-  // The record with 32-bit indices, to continue a run with.
-  InsertionRecord<std::uint32_t> WideRecord() const;
+  const InsertionRecord& record() const { return record_; }
 
   friend bool operator==(const Refinement&, const Refinement&) = default;
 
@@ -68,7 +65,7 @@ class Refinement {
   int width_ = 0, height_ = 0;
   std::vector<SamplePosition> inserted_;
   std::vector<float> errors_before_;
-  Record record_;
+  InsertionRecord record_;
 };
 
 }  // namespace terrace::tin

@@ -22,7 +22,7 @@ tin::Refinement RefinementTo(const tin::HeightField& field, double error, tin::G
   options.record = true;
   tin::GreedyTriangulation tin(field, options);
   tin.Run({error});
-  return tin.MakeRefinement();
+  return tin.MakeRefinement().value();
 }
 
 // One refinement for each field, as in a cache. `fields` must outlive it.

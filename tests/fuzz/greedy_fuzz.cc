@@ -80,7 +80,7 @@ void Run(FuzzInput& input) {
   TERRACE_CHECK(greedy.Run({bound}));
   const TinMesh mesh = greedy.Mesh();
   Expect(field, mesh, bound);
-  Expect(field, greedy.MakeRefinement().MeshAt(bound), bound);
+  Expect(field, greedy.MakeRefinement()->MeshAt(bound), bound);
   Expect(field, tin::DropVertices(field, mesh, {.max_error = bound}).value(), bound);
 }
 

@@ -27,7 +27,7 @@ const std::string& SerializedSeed() {
     options.record = true;
     tin::GreedyTriangulation greedy(field, options);
     TERRACE_CHECK(greedy.Run({20}));
-    std::string bytes = greedy.MakeRefinement().Serialize();
+    std::string bytes = greedy.MakeRefinement()->Serialize();
     bytes.resize(bytes.size() - sizeof(std::uint64_t));
     return new std::string(std::move(bytes));
   }();

@@ -50,9 +50,9 @@ struct MeshedGlb {
 // bound. Edges do not change: they are refined to 15/16 of the error, and the grid's rounding takes less than the rest.
 // `refinement`: as for MeshTile. `skirt_error_m`: determines the depth of skirts (proto/mesh/skirt.h), as in tilesets.
 // kCancelled: stopped.
-Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samples, const tin::Refinement& refinement,
-                          double wanted_error_m, double skirt_error_m, proto::PositionWidth width,
-                          const std::stop_token& stop) {
+Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samples,
+                          const std::optional<tin::Refinement>& refinement, double wanted_error_m, double skirt_error_m,
+                          proto::PositionWidth width, const std::stop_token& stop) {
   const Clock::time_point start = Clock::now();
   Result<ReplayedMesh> replayed =
       ReplayMesh(*dataset.model, samples, refinement, dataset.mesh_options, wanted_error_m, stop);

@@ -100,14 +100,13 @@ tin::HeightField FieldOf(const proto::TileSamples& samples) {
 }
 
 Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::TileSamples& samples,
-                                const tin::Refinement& refinement, const MeshOptions& mesh_options,
+                                const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
                                 double wanted_error_m, const std::stop_token& stop) {
   double error_m = wanted_error_m;
   Result<tin::TinMesh> mesh =
-      refinement.vertex_count() <= proto::kMaxTileVertices
-          ? refinement.MeshAt(error_m)
-          : RefineWithinFormat(FieldOf(samples), RefineOptionsOf(model, samples, mesh_options.criterion), 2, error_m,
-                               stop);
+      refinement ? refinement->MeshAt(error_m)
+                 : RefineWithinFormat(FieldOf(samples), RefineOptionsOf(model, samples, mesh_options.criterion), 2,
+                                      error_m, stop);
   if (mesh && mesh_options.compact) {
     mesh = Compact(FieldOf(samples), *mesh, RefineOptionsOf(model, samples, mesh_options.criterion), error_m, stop);
   }
@@ -116,8 +115,8 @@ Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::T
 }
 
 Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
-                            const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
-                            const std::stop_token& stop) {
+                            const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
+                            double wanted_error_m, const std::stop_token& stop) {
   const tin::SampleLimits limits = LimitsOf(model, samples.key);
   const proto::EdgeSteps steps =
       EdgeStepsOf(model, samples.key, EdgeErrorsOf(model, samples.key, limits, wanted_error_m));

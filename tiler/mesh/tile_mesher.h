@@ -39,20 +39,20 @@ tl::unexpected<Error> Cancelled();
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::TileSamples& samples);
 
-// Makes the mesh for the error: replays the refinement or, if it has more vertices than the format allows,
-// inserts anew with a larger error inside the tile but not on its edges. Then the drop pass (tin::DropVertices) if
-// MeshOptions::compact is set, and WithInnerVertices (inner_vertices.h). The mesh is not quantized yet. `refinement` as
-// for MeshTile. kCancelled: stopped.
+// Makes the mesh for the error: replays the refinement or, if there is none, inserts anew with a larger error inside
+// the tile but not on its edges. Then the drop pass (tin::DropVertices) if MeshOptions::compact is set, and
+// WithInnerVertices (inner_vertices.h). The mesh is not quantized yet. `refinement` as for MeshTile. kCancelled:
+// stopped.
 Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::TileSamples& samples,
-                                const tin::Refinement& refinement, const MeshOptions& mesh_options,
+                                const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
                                 double wanted_error_m, const std::stop_token& stop);
 
 // ReplayMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
-// run with RefineOptionsOf to this error or a finer one, or until the format's vertex limit; in that case the inside is
-// coarser than requested and the edges are not. If quantization would flip a triangle, the tile is refined
-// anew by the Delaunay criterion, without drop pass and WithInnerVertices. kCancelled: stopped.
+// run with RefineOptionsOf to this error or a finer one; none: that takes more vertices than the format allows. In that
+// case the inside is coarser than requested and the edges are not. If quantization would flip a triangle, the tile is
+// refined anew by the Delaunay criterion, without drop pass and WithInnerVertices. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
-                            const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
-                            const std::stop_token& stop);
+                            const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
+                            double wanted_error_m, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

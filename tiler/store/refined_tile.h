@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
@@ -15,12 +16,13 @@ namespace terrace::tiler {
 
 struct RefinedTile {
   dem::TileHeights heights;
-  tin::Refinement refinement;
-  double error_m = 0;  // the smallest error that the refinement serves
+  std::optional<tin::Refinement> refinement;  // none: the run was too large for one
+  double error_m = 0;                         // the smallest error that the refinement serves
 };
 
 inline std::size_t BytesOf(const RefinedTile& tile) {
-  return sizeof(RefinedTile) + tile.heights.heights.capacity() * sizeof(float) + tile.refinement.bytes();
+  return sizeof(RefinedTile) + tile.heights.heights.capacity() * sizeof(float) +
+         (tile.refinement ? tile.refinement->bytes() : 0);
 }
 
 using RefinedTilePtr = std::shared_ptr<const RefinedTile>;

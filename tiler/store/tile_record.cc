@@ -143,14 +143,14 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
 std::string SerializeRefinedTile(const RefinedTile& tile) {
   const dem::TileHeights& heights = tile.heights;
   ByteWriter writer;
-  writer.Reserve(heights.heights.size() * sizeof(float) + tile.refinement.bytes() + 64);
+  writer.Reserve(heights.heights.size() * sizeof(float) + tile.refinement->bytes() + 64);
   writer.Put(tile.error_m);
   writer.Put(static_cast<std::int32_t>(heights.lattice.level));
   writer.Put(static_cast<std::int32_t>(heights.lattice.cells));
   writer.Put(static_cast<std::int32_t>(heights.stride));
   writer.Put(heights.source_error_m);
   PutText(writer, {reinterpret_cast<const char*>(heights.heights.data()), heights.heights.size() * sizeof(float)});
-  PutText(writer, tile.refinement.Serialize());
+  PutText(writer, tile.refinement->Serialize());
   return writer.Take();
 }
 

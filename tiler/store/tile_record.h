@@ -31,6 +31,7 @@ std::string SerializeTile(const EncodedTile& tile);
 // The times of the build are zero. kInvalidArgument: not written by SerializeTile.
 Result<EncodedTile> ParseTile(std::string_view bytes);
 
+// Precondition: the tile has a refinement.
 std::string SerializeRefinedTile(const RefinedTile& tile);
 // kInvalidArgument: not written by SerializeRefinedTile.
 Result<RefinedTile> ParseRefinedTile(std::string_view bytes);

@@ -392,7 +392,7 @@ TEST(DataDependent, ReplaysEveryPrefixOfARun) {
         options.record = true;
         GreedyTriangulation tin(field, options);
         EXPECT_TRUE(tin.Run({1}));
-        const Refinement refinement = tin.MakeRefinement();
+        const Refinement refinement = tin.MakeRefinement().value();
         EXPECT_TRUE(HaveTheSameTriangles(refinement.MeshOf(refinement.vertex_count()), tin.Mesh()));
         for (const double error : {50.0, 20.0, 10.0, 5.0}) {
           EXPECT_TRUE(HaveTheSameTriangles(refinement.MeshAt(error), MeshAt(field, {error}, options))) << error;
@@ -412,7 +412,7 @@ TEST(DataDependent, ContinuesARefinementToTheRefinementOfOneRun) {
         GreedyTriangulation coarse(field, options), fine(field, options);
         EXPECT_TRUE(coarse.Run({20}));
         EXPECT_TRUE(fine.Run({1}));
-        GreedyTriangulation continued(field, options, coarse.MakeRefinement());
+        GreedyTriangulation continued(field, options, coarse.MakeRefinement().value());
         EXPECT_TRUE(continued.Run({1}));
         EXPECT_TRUE(HaveTheSameTriangles(continued.Mesh(), fine.Mesh()));
         EXPECT_EQ(continued.MakeRefinement(), fine.MakeRefinement());

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/tin/greedy.h"
+#include "engine/tin/insertion_recorder.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"
 
@@ -31,7 +33,7 @@ GreedyOptions TileOptions(int side) {
 Refinement RefineTo(const HeightField& field, double error, const GreedyOptions& options) {
   GreedyTriangulation tin(field, options);
   EXPECT_TRUE(tin.Run({error}));
-  return tin.MakeRefinement();
+  return tin.MakeRefinement().value();
 }
 
 std::vector<HeightField> Fields() {
@@ -68,7 +70,7 @@ TEST(Refinement, HasTheTrianglesOfTheRun) {
   const HeightField field = HillField(65, 65, 4);
   GreedyTriangulation tin(field, Recorded());
   EXPECT_TRUE(tin.Run({3}));
-  const TinMesh replayed = tin.MakeRefinement().MeshAt(3), run = tin.Mesh();
+  const TinMesh replayed = tin.MakeRefinement()->MeshAt(3), run = tin.Mesh();
   EXPECT_EQ(replayed.vertices, run.vertices);
   const auto sorted = [](TinMesh mesh) {
     for (auto& triangle : mesh.triangles) {
@@ -94,15 +96,29 @@ TEST(Refinement, GoesOnAsIfItHadNeverStopped) {
   }
 }
 
-TEST(Refinement, TakesWideIndicesWhenItMust) {
+TEST(Refinement, HasAsManyVerticesAsSixteenBitsAllow) {
   const HeightField field = NoiseField(260, 260, 1);
-  const Refinement refinement = RefineTo(field, 0, Recorded());
-  ASSERT_GT(refinement.vertex_count(), 65536u);
-  EXPECT_TRUE(CoversExactly(field, refinement.MeshOf(refinement.vertex_count())));
-  const Refinement coarse = RefineTo(field, 30, Recorded());
-  ASSERT_LT(coarse.vertex_count(), 65536u);
-  EXPECT_TRUE(AreEqual(refinement.MeshAt(30), coarse.MeshAt(30)));
-  EXPECT_LT(static_cast<double>(coarse.bytes()) / static_cast<double>(coarse.vertex_count()), 40);
+  GreedyTriangulation tin(field, Recorded());
+  EXPECT_TRUE(tin.Run({.max_points = Refinement::kMaxVertices}));
+  const std::optional<Refinement> largest = tin.MakeRefinement();
+  ASSERT_TRUE(largest);
+  ASSERT_EQ(largest->vertex_count(), Refinement::kMaxVertices);
+  EXPECT_TRUE(CoversExactly(field, largest->MeshOf(Refinement::kMaxVertices)));
+  EXPECT_LT(static_cast<double>(largest->bytes()) / static_cast<double>(largest->vertex_count()), 40);
+  EXPECT_EQ(Refinement::Parse(largest->Serialize()).value(), *largest);
+  EXPECT_TRUE(tin.Run({.max_points = Refinement::kMaxVertices + 1}));
+  EXPECT_FALSE(tin.MakeRefinement());
+}
+
+TEST(Refinement, IsNoneIfAStarHasMoreTrianglesThanAnEntryHolds) {
+  Star star;
+  star.count = Refinement::kMaxStar + 1;
+  star.removed_count = star.count - 2;
+  star.ring.Grow(star.count + 1);
+  star.triangles.resize(star.ring.ids.size());
+  InsertionRecorder recorder(1);
+  recorder.Append({1, 1}, 5, star);
+  EXPECT_FALSE(recorder.Make(3, 3));
 }
 
 TEST(Refinement, SurvivesSerialization) {
@@ -114,10 +130,6 @@ TEST(Refinement, SurvivesSerialization) {
     EXPECT_EQ(*parsed, refinement);
     EXPECT_LT(static_cast<double>(bytes.size()), 40.0 * static_cast<double>(refinement.vertex_count()));
   }
-  const Refinement wide = RefineTo(NoiseField(260, 260, 1), 0, Recorded());
-  const Result<Refinement> parsed = Refinement::Parse(wide.Serialize());
-  ASSERT_TRUE(parsed.has_value()) << parsed.error().message;
-  EXPECT_EQ(*parsed, wide);
   const Refinement empty = RefineTo(HillField(9, 9, 1), 1e9, Recorded());
   EXPECT_EQ(Refinement::Parse(empty.Serialize()).value(), empty);
 }

@@ -74,7 +74,7 @@ TEST(SampleLimits, HoldAtEverySampleForEveryErrorOfOneRun) {
     options.record = true;
     GreedyTriangulation greedy(field, options);
     ASSERT_TRUE(greedy.Run({.max_error = 0.5}));
-    const Refinement refinement = greedy.MakeRefinement();
+    const Refinement refinement = greedy.MakeRefinement().value();
     for (const double error : {20.0, 5.0, 1.0, 0.5}) {
       const TinMesh mesh = refinement.MeshAt(error);
       ExpectLimitsKept(field, mesh, options.limits, error);

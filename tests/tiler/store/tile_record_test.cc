@@ -57,7 +57,7 @@ TEST(TileRecord, KeepsTiles) {
 
 TEST(TileRecord, KeepsRefinements) {
   const RefinedTile tile = Refined();
-  ASSERT_GT(tile.refinement.vertex_count(), 10u);
+  ASSERT_GT(tile.refinement->vertex_count(), 10u);
   const auto again = ParseRefinedTile(SerializeRefinedTile(tile));
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->error_m, tile.error_m);
