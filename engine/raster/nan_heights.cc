@@ -46,7 +46,7 @@ void Replace(float* heights, std::size_t count, float by) {
   for (; i < count; ++i) heights[i] = heights[i] == heights[i] ? heights[i] : by;
 }
 
-bool MarkVoids(const std::uint8_t* inside, const float* heights, std::size_t count, std::uint8_t* wanted) {
+bool MarkWanted(const std::uint8_t* inside, const float* heights, std::size_t count, std::uint8_t* wanted) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> words;
   const hn::Rebind<std::int16_t, decltype(d)> halves;
@@ -82,7 +82,7 @@ namespace {
 HWY_EXPORT(AreAllKnown);
 HWY_EXPORT(VoidsAmong);
 HWY_EXPORT(Replace);
-HWY_EXPORT(MarkVoids);
+HWY_EXPORT(MarkWanted);
 
 }  // namespace
 
@@ -122,7 +122,7 @@ void ReplaceVoids(std::span<float> heights, float by) {
 }
 
 bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted) {
-  return HWY_DYNAMIC_DISPATCH(MarkVoids)(inside.data(), heights.data(), heights.size(), wanted.data());
+  return HWY_DYNAMIC_DISPATCH(MarkWanted)(inside.data(), heights.data(), heights.size(), wanted.data());
 }
 
 }  // namespace terrace::dem

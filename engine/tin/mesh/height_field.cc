@@ -7,8 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "engine/tin/mesh/mark_voids.h"
-#include "engine/tin/mesh/quantum.h"
+#include "engine/tin/mesh/height_scans.h"
 
 namespace terrace::tin {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/tin/mesh/mark_voids.h"
+#include "engine/tin/mesh/height_scans.h"
 #include "tests/engine/tin/instruction_sets.h"
 #include "tests/engine/tin/test_fields.h"
 
