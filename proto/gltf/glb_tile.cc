@@ -20,9 +20,6 @@ namespace {
 using Vec3d = std::array<double, 3>;
 using Position = std::array<std::int32_t, 3>;
 
-// 65535 as a 16-bit index means "restart" in glTF.
-constexpr std::size_t kMaxNarrowVertices = 65535;
-
 // Bare ground: not metallic, not glossy.
 constexpr std::array<double, 4> kGroundColor{0.5, 0.5, 0.5, 1};
 
@@ -32,8 +29,12 @@ std::array<double, 16> MatrixAt(Vec3d origin, double scale) {
   return {scale, 0, 0, 0, 0, 0, -scale, 0, 0, scale, 0, 0, origin[0], origin[2], -origin[1], 1};
 }
 
-GltfComponent IndexComponent(std::size_t vertices) {
-  return vertices > kMaxNarrowVertices ? GltfComponent::kUnsignedInt : GltfComponent::kUnsignedShort;
+Vec3d OriginAt(const GridMesh& mesh, const Position& corner) {
+  Vec3d origin{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = static_cast<double>(mesh.origin[axis] + corner[axis]) * mesh.step_m;
+  }
+  return origin;
 }
 
 struct TileBox {
@@ -59,129 +60,82 @@ bool FitsShort(const TileBox& box) {
   return true;
 }
 
-// The arrays of a tile before compression, and how glTF describes them.
-struct Arrays {
-  std::string positions, normals, uv;
-  std::size_t position_stride = 0, normal_stride = 0, uv_stride = 0;
-  GltfAccessor position, normal, texture;
-  Vec3d origin{};
-  double scale = 1;
+// An array of vertices before compression, and how glTF describes it.
+struct Array {
+  std::string bytes;
+  std::size_t stride = 0;
+  GltfAccessor accessor;
 };
+
+// `put`: appends a record of `stride` bytes.
+template <typename Values, typename Put>
+Array MakeArray(const Values& values, std::size_t stride, GltfAccessor accessor, const Put& put) {
+  ByteWriter out;
+  out.Reserve(stride * values.size());
+  for (const auto& value : values) put(out, value);
+  accessor.count = values.size();
+  return {out.Take(), stride, std::move(accessor)};
+}
+
+// Whole steps above the box's corner, in records of 8 bytes: vertex attributes are aligned to 4.
+Array ShortPositions(const GridMesh& mesh, const TileBox& box) {
+  GltfAccessor accessor{.component = GltfComponent::kUnsignedShort};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    accessor.min.push_back(0);
+    accessor.max.push_back(box.max[axis] - box.min[axis]);
+  }
+  return MakeArray(mesh.positions, 8, std::move(accessor), [&](ByteWriter& out, const Position& p) {
+    for (std::size_t axis = 0; axis < 3; ++axis) out.Put(static_cast<std::uint16_t>(p[axis] - box.min[axis]));
+    out.Put(std::uint16_t{0});
+  });
+}
+
+Array FloatPositions(const GridMesh& mesh, const TileBox& box) {
+  GltfAccessor accessor;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    accessor.min.push_back(box.min[axis] * mesh.step_m);
+    accessor.max.push_back(box.max[axis] * mesh.step_m);
+  }
+  return MakeArray(mesh.positions, 12, std::move(accessor), [&](ByteWriter& out, const Position& p) {
+    for (const std::int32_t steps : p) out.Put(static_cast<float>(steps * mesh.step_m));
+  });
+}
 
 // [-1, 1] to -127..127, as glTF's normalized bytes decode: c / 127.
 std::int8_t NormalByte(double component) { return static_cast<std::int8_t>(std::floor(component * 127 + 0.5)); }
 
-// Whole steps above the box's corner, in records of 8 bytes: vertex attributes are aligned to 4.
-void PutShortPositions(const GridMesh& mesh, const TileBox& box, Arrays& arrays) {
-  ByteWriter out;
-  out.Reserve(8 * mesh.positions.size());
-  for (const Position& p : mesh.positions) {
-    for (std::size_t axis = 0; axis < 3; ++axis) out.Put(static_cast<std::uint16_t>(p[axis] - box.min[axis]));
-    out.Put(std::uint16_t{0});
+Array Normals(const GridMesh& mesh, bool quantized) {
+  if (!quantized) {
+    return MakeArray(mesh.normals, 12, {}, [](ByteWriter& out, const geo::Vec3& n) {
+      for (const double component : {n.x, n.y, n.z}) out.Put(static_cast<float>(component));
+    });
   }
-  arrays.positions = out.Take();
-  arrays.position_stride = 8;
-  arrays.position.component = GltfComponent::kUnsignedShort;
-  arrays.scale = mesh.step_m;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    arrays.origin[axis] = static_cast<double>(mesh.origin[axis] + box.min[axis]) * mesh.step_m;
-    arrays.position.min.push_back(0);
-    arrays.position.max.push_back(box.max[axis] - box.min[axis]);
-  }
+  return MakeArray(mesh.normals, 4, {.component = GltfComponent::kByte, .normalized = true},
+                   [](ByteWriter& out, const geo::Vec3& n) {
+                     for (const double component : {n.x, n.y, n.z}) out.Put(NormalByte(component));
+                     out.Put(std::int8_t{0});
+                   });
 }
 
-void PutFloatPositions(const GridMesh& mesh, const TileBox& box, Arrays& arrays) {
-  ByteWriter out;
-  out.Reserve(12 * mesh.positions.size());
-  for (const Position& p : mesh.positions) {
-    for (const std::int32_t steps : p) out.Put(static_cast<float>(steps * mesh.step_m));
+// Quantized: lattice columns and rows to 0 .. 65535: off by less than a 65,536th of the picture's edge.
+Array TextureCoordinates(const GridMesh& mesh, bool quantized) {
+  const int cells = mesh.cells;
+  if (!quantized) {
+    return MakeArray(mesh.uv, 8, {.type = "VEC2"}, [cells](ByteWriter& out, const auto& uv) {
+      for (const int node : uv) out.Put(static_cast<float>(node) / static_cast<float>(cells));
+    });
   }
-  arrays.positions = out.Take();
-  arrays.position_stride = 12;
-  arrays.position.component = GltfComponent::kFloat;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    arrays.origin[axis] = static_cast<double>(mesh.origin[axis]) * mesh.step_m;
-    arrays.position.min.push_back(box.min[axis] * mesh.step_m);
-    arrays.position.max.push_back(box.max[axis] * mesh.step_m);
-  }
+  return MakeArray(mesh.uv, 4, {.component = GltfComponent::kUnsignedShort, .type = "VEC2", .normalized = true},
+                   [cells](ByteWriter& out, const auto& uv) {
+                     for (const int node : uv) {
+                       out.Put(static_cast<std::uint16_t>((2 * 65535 * node + cells) / (2 * cells)));
+                     }
+                   });
 }
 
-void PutByteNormals(const GridMesh& mesh, Arrays& arrays) {
+std::string IndexBytes(const std::vector<std::array<std::uint32_t, 3>>& triangles, GltfComponent component) {
   ByteWriter out;
-  out.Reserve(4 * mesh.normals.size());
-  for (const geo::Vec3& n : mesh.normals) {
-    for (const double component : {n.x, n.y, n.z}) out.Put(NormalByte(component));
-    out.Put(std::int8_t{0});
-  }
-  arrays.normals = out.Take();
-  arrays.normal_stride = 4;
-  arrays.normal.component = GltfComponent::kByte;
-  arrays.normal.normalized = true;
-}
-
-void PutFloatNormals(const GridMesh& mesh, Arrays& arrays) {
-  ByteWriter out;
-  out.Reserve(12 * mesh.normals.size());
-  for (const geo::Vec3& n : mesh.normals) {
-    for (const double component : {n.x, n.y, n.z}) out.Put(static_cast<float>(component));
-  }
-  arrays.normals = out.Take();
-  arrays.normal_stride = 12;
-}
-
-// Lattice columns and rows to 0 .. 65535: off by less than a 65,536th of the picture's edge.
-void PutShortTextureCoordinates(const GridMesh& mesh, Arrays& arrays) {
-  ByteWriter out;
-  out.Reserve(4 * mesh.uv.size());
-  for (const auto& uv : mesh.uv) {
-    for (const int node : uv) out.Put(static_cast<std::uint16_t>((2 * 65535 * node + mesh.cells) / (2 * mesh.cells)));
-  }
-  arrays.uv = out.Take();
-  arrays.uv_stride = 4;
-  arrays.texture = {.component = GltfComponent::kUnsignedShort, .type = "VEC2", .normalized = true};
-}
-
-void PutFloatTextureCoordinates(const GridMesh& mesh, Arrays& arrays) {
-  ByteWriter out;
-  out.Reserve(8 * mesh.uv.size());
-  for (const auto& uv : mesh.uv) {
-    for (const int node : uv) out.Put(static_cast<float>(node) / static_cast<float>(mesh.cells));
-  }
-  arrays.uv = out.Take();
-  arrays.uv_stride = 8;
-  arrays.texture = {.type = "VEC2"};
-}
-
-Arrays MakeArrays(const GridMesh& mesh, bool quantized) {
-  const TileBox box = BoxOf(mesh);
-  Arrays arrays;
-  if (quantized && FitsShort(box)) {
-    PutShortPositions(mesh, box, arrays);
-  } else {
-    PutFloatPositions(mesh, box, arrays);
-  }
-  if (quantized) {
-    PutByteNormals(mesh, arrays);
-    PutShortTextureCoordinates(mesh, arrays);
-  } else {
-    PutFloatNormals(mesh, arrays);
-    PutFloatTextureCoordinates(mesh, arrays);
-  }
-  arrays.position.count = arrays.normal.count = arrays.texture.count = mesh.positions.size();
-  return arrays;
-}
-
-std::string IndexBytes(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::size_t vertices) {
-  ByteWriter out;
-  for (const auto& triangle : triangles) {
-    for (const std::uint32_t index : triangle) {
-      if (vertices > kMaxNarrowVertices) {
-        out.Put(index);
-      } else {
-        out.Put(static_cast<std::uint16_t>(index));
-      }
-    }
-  }
+  for (const auto& triangle : triangles) PutTriangle(out, triangle, component);
   return out.Take();
 }
 
@@ -211,18 +165,21 @@ std::size_t AddView(GltfMesh& gltf, ByteWriter& buffer, std::string_view bytes, 
   return gltf.views.size() - 1;
 }
 
-std::size_t AddMeshoptView(GltfMesh& gltf, ByteWriter& buffer, std::string_view bytes, std::size_t count,
-                           std::size_t stride, GltfTarget target) {
-  const std::size_t view = AddView(gltf, buffer, bytes, stride, target);
-  gltf.views[view].meshopt = GltfMeshopt{target == GltfTarget::kIndices ? "TRIANGLES" : "ATTRIBUTES", "NONE", count};
-  return view;
-}
-
 // The last view, so that a texture does not move others.
 void AddTexture(const std::optional<GlbTexture>& texture, GltfMesh& gltf, ByteWriter& buffer) {
   if (!texture) return;
   gltf.texture = {AddView(gltf, buffer, texture->bytes, 0, GltfTarget::kNone), texture->media_type};
   if (texture->media_type == "image/webp") gltf.extensions.push_back("EXT_texture_webp");
+}
+
+// `vertices`: accessors of positions, normals and, if there are three, texture coordinates. That of the indices is the
+// third, with texture coordinates or without.
+void SetAccessors(std::vector<GltfAccessor> vertices, GltfAccessor indices, GltfMesh& gltf) {
+  vertices.insert(vertices.begin() + 2, std::move(indices));
+  gltf.accessors = std::move(vertices);
+  gltf.indices = 2;
+  gltf.attributes = {{"POSITION", 0}, {"NORMAL", 1}};
+  if (gltf.accessors.size() > 3) gltf.attributes.emplace_back("TEXCOORD_0", 3);
 }
 
 Result<GlbTile> Assemble(GltfMesh gltf, ByteWriter buffer) {
@@ -244,25 +201,20 @@ Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options)
   if (!draco) return tl::unexpected(draco.error());
   GltfMesh gltf = Describe(options);
   gltf.extensions = {"KHR_draco_mesh_compression"};
-  Vec3d origin{};
-  for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = static_cast<double>(mesh.origin[axis]) * mesh.step_m;
-  gltf.matrix = MatrixAt(origin, 1);
+  gltf.matrix = MatrixAt(OriginAt(mesh, {}), 1);
   ByteWriter buffer;
   const std::size_t view = AddView(gltf, buffer, draco->bytes, 0, GltfTarget::kNone);
   gltf.draco = GltfDraco{view, {{"POSITION", draco->position_id}, {"NORMAL", draco->normal_id}}};
   GltfAccessor position{.count = draco->points};
   position.min.assign(draco->min.begin(), draco->min.end());
   position.max.assign(draco->max.begin(), draco->max.end());
-  gltf.accessors = {position,
-                    {.count = draco->points},
-                    {.component = IndexComponent(draco->points), .type = "SCALAR", .count = 3 * draco->triangles}};
-  gltf.attributes = {{"POSITION", 0}, {"NORMAL", 1}};
-  gltf.indices = 2;
+  std::vector<GltfAccessor> vertices = {std::move(position), {.count = draco->points}};
   if (options.texture) {
     gltf.draco->attributes.emplace_back("TEXCOORD_0", draco->uv_id);
-    gltf.accessors.push_back({.type = "VEC2", .count = draco->points});
-    gltf.attributes.emplace_back("TEXCOORD_0", 3);
+    vertices.push_back({.type = "VEC2", .count = draco->points});
   }
+  SetAccessors(std::move(vertices),
+               {.component = IndexComponent(draco->points), .type = "SCALAR", .count = 3 * draco->triangles}, gltf);
   AddTexture(options.texture, gltf, buffer);
   return Assemble(std::move(gltf), std::move(buffer));
 }
@@ -270,43 +222,33 @@ Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options)
 Result<GlbTile> EncodeArrays(const GridMesh& mesh, const GlbOptions& options) {
   const bool quantized = options.compression != GlbCompression::kNone;
   const bool meshopt = options.compression == GlbCompression::kMeshopt;
-  Arrays arrays = MakeArrays(mesh, quantized);
-  const std::size_t count = mesh.positions.size(), corners = 3 * mesh.triangles.size();
+  const TileBox box = BoxOf(mesh);
+  const bool has_short_positions = quantized && FitsShort(box);
+  std::vector<Array> arrays;
+  arrays.push_back(has_short_positions ? ShortPositions(mesh, box) : FloatPositions(mesh, box));
+  arrays.push_back(Normals(mesh, quantized));
+  if (options.texture) arrays.push_back(TextureCoordinates(mesh, quantized));
   GltfMesh gltf = Describe(options);
   if (quantized) gltf.extensions.push_back("KHR_mesh_quantization");
   if (meshopt) gltf.extensions.push_back("EXT_meshopt_compression");
-  gltf.matrix = MatrixAt(arrays.origin, arrays.scale);
-  GltfAccessor index{.component = IndexComponent(count), .type = "SCALAR", .count = corners};
+  gltf.matrix = has_short_positions ? MatrixAt(OriginAt(mesh, box.min), mesh.step_m) : MatrixAt(OriginAt(mesh, {}), 1);
   ByteWriter buffer;
-  if (meshopt) {
-    arrays.position.view =
-        AddMeshoptView(gltf, buffer, EncodeMeshoptVertices(arrays.positions, count, arrays.position_stride), count,
-                       arrays.position_stride, GltfTarget::kVertices);
-    arrays.normal.view =
-        AddMeshoptView(gltf, buffer, EncodeMeshoptVertices(arrays.normals, count, arrays.normal_stride), count,
-                       arrays.normal_stride, GltfTarget::kVertices);
-    if (options.texture) {
-      arrays.texture.view = AddMeshoptView(gltf, buffer, EncodeMeshoptVertices(arrays.uv, count, arrays.uv_stride),
-                                           count, arrays.uv_stride, GltfTarget::kVertices);
-    }
-    const std::size_t width = index.component == GltfComponent::kUnsignedInt ? 4 : 2;
-    index.view = AddMeshoptView(gltf, buffer, EncodeMeshoptTriangles(mesh.triangles, count), corners, width,
-                                GltfTarget::kIndices);
-  } else {
-    arrays.position.view = AddView(gltf, buffer, arrays.positions, arrays.position_stride, GltfTarget::kVertices);
-    arrays.normal.view = AddView(gltf, buffer, arrays.normals, arrays.normal_stride, GltfTarget::kVertices);
-    if (options.texture) {
-      arrays.texture.view = AddView(gltf, buffer, arrays.uv, arrays.uv_stride, GltfTarget::kVertices);
-    }
-    index.view = AddView(gltf, buffer, IndexBytes(mesh.triangles, count), 0, GltfTarget::kIndices);
+  const std::size_t count = mesh.positions.size(), corners = 3 * mesh.triangles.size();
+  std::vector<GltfAccessor> vertices;
+  for (Array& array : arrays) {
+    const std::string bytes =
+        meshopt ? EncodeMeshoptVertices(array.bytes, count, array.stride) : std::move(array.bytes);
+    array.accessor.view = AddView(gltf, buffer, bytes, array.stride, GltfTarget::kVertices);
+    if (meshopt) gltf.views.back().meshopt = {"ATTRIBUTES", count};
+    vertices.push_back(std::move(array.accessor));
   }
-  gltf.accessors = {std::move(arrays.position), std::move(arrays.normal), std::move(index)};
-  gltf.attributes = {{"POSITION", 0}, {"NORMAL", 1}};
-  gltf.indices = 2;
-  if (options.texture) {
-    gltf.accessors.push_back(std::move(arrays.texture));
-    gltf.attributes.emplace_back("TEXCOORD_0", 3);
-  }
+  GltfAccessor indices{.component = IndexComponent(count), .type = "SCALAR", .count = corners};
+  const std::size_t width = indices.component == GltfComponent::kUnsignedInt ? 4 : 2;
+  const std::string bytes =
+      meshopt ? EncodeMeshoptTriangles(mesh.triangles, count) : IndexBytes(mesh.triangles, indices.component);
+  indices.view = AddView(gltf, buffer, bytes, meshopt ? width : 0, GltfTarget::kIndices);
+  if (meshopt) gltf.views.back().meshopt = {"TRIANGLES", corners};
+  SetAccessors(std::move(vertices), std::move(indices), gltf);
   AddTexture(options.texture, gltf, buffer);
   return Assemble(std::move(gltf), std::move(buffer));
 }

@@ -36,14 +36,12 @@ Json ViewJson(const GltfView& view, Fallback& fallback) {
   if (view.stride > 0 && view.target == GltfTarget::kVertices) json["byteStride"] = view.stride;
   if (view.target != GltfTarget::kNone) json["target"] = static_cast<int>(view.target);
   if (view.meshopt) {
-    Json& extension = json["extensions"][kMeshopt];
-    extension = {{"buffer", 0},
-                 {"byteOffset", view.offset},
-                 {"byteLength", view.length},
-                 {"byteStride", view.stride},
-                 {"count", view.meshopt->count},
-                 {"mode", view.meshopt->mode}};
-    if (view.meshopt->filter != "NONE") extension["filter"] = view.meshopt->filter;
+    json["extensions"][kMeshopt] = {{"buffer", 0},
+                                    {"byteOffset", view.offset},
+                                    {"byteLength", view.length},
+                                    {"byteStride", view.stride},
+                                    {"count", view.meshopt->count},
+                                    {"mode", view.meshopt->mode}};
   }
   return json;
 }

@@ -7,11 +7,14 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "engine/core/bytes.h"
 
 namespace terrace::proto {
 
@@ -19,8 +22,22 @@ namespace terrace::proto {
 enum class GltfComponent { kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
 enum class GltfTarget { kNone = 0, kVertices = 34962, kIndices = 34963 };
 
+// Indices have 16 bits if there are few enough vertices. 65535 as a 16-bit index means "restart" in glTF.
+constexpr GltfComponent IndexComponent(std::size_t vertices) {
+  return vertices > 65535 ? GltfComponent::kUnsignedInt : GltfComponent::kUnsignedShort;
+}
+inline void PutTriangle(ByteWriter& out, const std::array<std::uint32_t, 3>& triangle, GltfComponent component) {
+  for (const std::uint32_t index : triangle) {
+    if (component == GltfComponent::kUnsignedInt) {
+      out.Put(index);
+    } else {
+      out.Put(static_cast<std::uint16_t>(index));
+    }
+  }
+}
+
 struct GltfMeshopt {
-  std::string_view mode, filter;  // "ATTRIBUTES", "TRIANGLES"; "NONE", "OCTAHEDRAL", "EXPONENTIAL"
+  std::string_view mode;  // "ATTRIBUTES", "TRIANGLES"; without a filter
   std::size_t count = 0;
 };
 

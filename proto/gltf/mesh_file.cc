@@ -159,8 +159,7 @@ void Place(const GridPlacement& t, std::vector<MeshVertex>& vertices) {
 // Colours are aligned to 4 bytes, as glTF requires of vertex attributes.
 constexpr std::size_t kGlbColorBytes = 4 * sizeof(std::uint16_t);
 
-// Accessors over one buffer: positions, indices, and colours if there are any. 65535 as a 16-bit index means "restart"
-// in glTF.
+// Accessors over one buffer: positions, indices, and colours if there are any.
 struct GlbLayout {
   std::size_t vertices, indices;
   bool has_colors;
@@ -168,9 +167,9 @@ struct GlbLayout {
   Vec3d center;  // of what is stored
   Vec3f min, max;
 
-  bool wide() const { return vertices > 65535; }
+  GltfComponent index() const { return IndexComponent(vertices); }
   std::size_t position_bytes() const { return vertices * sizeof(Vec3f); }
-  std::size_t index_bytes() const { return indices * (wide() ? sizeof(std::uint32_t) : sizeof(std::uint16_t)); }
+  std::size_t index_bytes() const { return indices * (index() == GltfComponent::kUnsignedInt ? 4 : 2); }
   std::size_t color_offset() const { return (position_bytes() + index_bytes() + 3) / 4 * 4; }
   std::size_t color_bytes() const { return has_colors ? vertices * kGlbColorBytes : 0; }
   std::size_t buffer_bytes() const { return color_offset() + color_bytes(); }
@@ -198,11 +197,7 @@ GltfMesh GltfOf(const GlbLayout& layout) {
   GltfAccessor positions{.view = 0, .count = layout.vertices};
   positions.min.assign(layout.min.begin(), layout.min.end());
   positions.max.assign(layout.max.begin(), layout.max.end());
-  mesh.accessors = {positions,
-                    {.view = 1,
-                     .component = layout.wide() ? GltfComponent::kUnsignedInt : GltfComponent::kUnsignedShort,
-                     .type = "SCALAR",
-                     .count = layout.indices}};
+  mesh.accessors = {positions, {.view = 1, .component = layout.index(), .type = "SCALAR", .count = layout.indices}};
   mesh.attributes = {{"POSITION", 0}};
   mesh.indices = 1;
   if (layout.has_colors) {
@@ -242,13 +237,7 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
   }
   for (const Triangle& triangle : triangles) {
     if (poll.IsStopped()) return {};
-    for (std::uint32_t index : triangle) {
-      if (layout.wide()) {
-        buffer.Put(index);
-      } else {
-        buffer.Put(static_cast<std::uint16_t>(index));
-      }
-    }
+    PutTriangle(buffer, triangle, layout.index());
   }
   buffer.PadTo(4);
   const std::array<std::uint16_t, 256> linear = LinearLevels();
