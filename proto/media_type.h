@@ -6,8 +6,6 @@
 
 namespace terrace::proto {
 
-inline constexpr std::string_view kQuantizedMeshType = "application/vnd.quantized-mesh";
-
 // Extensions of quantized-mesh-1.0.
 struct TileExtensions {
   bool normals = false;     // extension 1, octvertexnormals

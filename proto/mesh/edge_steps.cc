@@ -25,11 +25,6 @@ double NeededStep(double min_height, double max_height) {
   return PowerOfTwoAtLeast(std::max((max_height - min_height) / 16384, kHeightResolution));
 }
 
-EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
-                        bool at_south_pole, bool at_north_pole) {
-  return MakeEdgeSteps(EdgeErrors(error_m), needed, pole_step, at_south_pole, at_north_pole);
-}
-
 EdgeSteps MakeEdgeSteps(const EdgeErrors& errors, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
                         bool at_south_pole, bool at_north_pole) {
   const double requested = std::max(PowerOfTwoAtMost(errors.tile / 8), kHeightResolution);

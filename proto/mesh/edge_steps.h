@@ -59,8 +59,6 @@ double NeededStep(double min_height, double max_height);
 // the rows of `needed` beyond it are not read.
 EdgeSteps MakeEdgeSteps(const EdgeErrors& errors, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
                         bool at_south_pole, bool at_north_pole);
-EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
-                        bool at_south_pole, bool at_north_pole);
 
 // The step of a vertex: that of its edge or corner; 0 inside the tile.
 double StepAt(const EdgeSteps& steps, int x, int y, int cells);

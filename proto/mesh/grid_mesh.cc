@@ -157,14 +157,6 @@ double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width
   return std::min(step_m, std::max(kBorderStepMetres, fitting_m));
 }
 
-std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m) {
-  const NodePlacer placer(samples);
-  std::vector<GridPoint> points;
-  points.reserve(mesh.vertices.size());
-  for (const tin::SamplePosition node : mesh.vertices) points.push_back(Snap(placer.Place(node, 0), 1 / step_m));
-  return points;
-}
-
 GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double smallest_allowed_m,
                      PositionWidth width)
     : inside(GridStep(lattice, errors.tile, width)) {

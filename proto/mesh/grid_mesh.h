@@ -35,11 +35,6 @@ double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width
 // Whole steps along the axes of ECEF.
 using GridPoint = std::array<std::int64_t, 3>;
 
-// The vertices of `mesh` at their exact lattice positions and heights, rounded to the grid. The point of a node does
-// not depend on the tile. Sines and cosines have the same bits on every processor (engine/geo/sine.h), and so do
-// the points.
-std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m);
-
 // The steps of a tile with limits by place (EdgeErrors). `smallest_allowed_m`: the smallest error that a sample of the
 // tile may have. All steps are multiples of `inside`. Limits refine a step only until
 // a tile's side spans 2^22 to 2^23 steps, as with the finest error.
@@ -52,7 +47,9 @@ struct GridSteps {
   void Double();
 };
 
-// As above, but points on edges lie on the grids of side and corner, which both neighbours have. In units of `inside`.
+// The vertices of `mesh` at their exact lattice positions and heights, rounded to the grid; on edges to the grids of
+// side and corner, which both neighbours have. In units of `inside`. The point of a node does not depend on the tile.
+// Sines and cosines have the same bits on every processor (engine/geo/sine.h), and so do the points.
 std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, const GridSteps& steps);
 
 // Whether decoders that compute in 32-bit floats decode all points, and the lower rim of skirts of this depth, exactly.

@@ -130,10 +130,6 @@ void PutMetadata(ByteWriter& out, const std::string& json) {
 
 }  // namespace
 
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions) {
-  return EncodeQuantizedMesh(tile, extensions, DecodePositions(tile));
-}
-
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions,
                                 const std::vector<geo::Vec3>& positions) {
   CheckPreconditions(tile, extensions);

@@ -41,7 +41,6 @@ struct QuantizedTile {
 // `positions`: of the tile's vertices as clients decode them, ECEF.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions,
                                 const std::vector<geo::Vec3>& positions);
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions);
 
 // Decodes the mesh of a tile: header, vertices and triangles, without the lists of edges and the extensions. Nothing:
 // one of these is incomplete or invalid, or there are more than kMaxTileVertices vertices. Keeps vertices without a

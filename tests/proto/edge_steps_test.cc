@@ -40,7 +40,7 @@ TEST(EdgeSteps, AgreeBetweenNeighbours) {
       for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 3; ++c) window[r][c] = needed[row - 1 + r][column - 1 + c];
       }
-      return MakeEdgeSteps(error, window, 1, false, false);
+      return MakeEdgeSteps(EdgeErrors(error), window, 1, false, false);
     };
     const EdgeSteps sw = steps_of(1, 1), se = steps_of(1, 2), nw = steps_of(2, 1), ne = steps_of(2, 2);
     EXPECT_EQ(sw.side[1], se.side[3]);
@@ -60,7 +60,7 @@ TEST(EdgeSteps, AgreeBetweenNeighbours) {
 TEST(EdgeSteps, PutAPoleOnOneGrid) {
   Needs needed{};
   for (auto& row : needed) row = {0.25, 0.5, 1.0};
-  const EdgeSteps steps = MakeEdgeSteps(1, needed, 4, true, false);
+  const EdgeSteps steps = MakeEdgeSteps(EdgeErrors(1), needed, 4, true, false);
   EXPECT_EQ(steps.side[0], 4);
   EXPECT_EQ(steps.corner[0], 4);
   EXPECT_EQ(steps.corner[1], 4);

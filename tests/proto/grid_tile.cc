@@ -31,6 +31,10 @@ QuantizedTile GridTile(const geo::TileKey& key, int columns, int rows, float min
   return tile;
 }
 
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions) {
+  return EncodeQuantizedMesh(tile, extensions, DecodePositions(tile));
+}
+
 QuantizedHeight Rugged() {
   return [](int column, int row) {
     if (row == 0 && column < 2) return static_cast<std::uint16_t>(column * kQuantizedMax);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 
 #include "proto/mesh/quantized_mesh.h"
 
@@ -14,6 +15,9 @@ using QuantizedHeight = std::function<std::uint16_t(int column, int row)>;
 // 0..32767. With normals: straight up from the ellipsoid.
 QuantizedTile GridTile(const geo::TileKey& key, int columns, int rows, float min_height, float max_height,
                        const QuantizedHeight& height);
+
+// With the positions that clients decode.
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions);
 
 // Random heights that include 0 and 32767, the same in every run.
 QuantizedHeight Rugged();

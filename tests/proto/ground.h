@@ -13,6 +13,7 @@
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
+#include "proto/mesh/grid_mesh.h"
 #include "proto/tile_samples.h"
 
 namespace terrace::proto {
@@ -72,6 +73,15 @@ inline tin::TinMesh GreedyMesh(const TileSamples& samples, const tin::GreedyGoal
   tin::GreedyTriangulation triangulation(*field);
   triangulation.Run(goal);
   return triangulation.Mesh();
+}
+
+// With the same step everywhere.
+inline std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m) {
+  GridSteps steps(samples.lattice, EdgeErrors(1), 1, PositionWidth::kFloat);
+  steps.inside = step_m;
+  steps.side.fill(step_m);
+  steps.corner.fill(step_m);
+  return SnapVertices(samples, mesh, steps);
 }
 
 // Random heights between 0 and `relief`, the same in every run.

@@ -64,8 +64,8 @@ TEST(QuantizedMeshContentType, NamesWhatTheTileCarries) {
   for (int bits = 0; bits < 8; ++bits) {
     const TileExtensions extensions{(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0};
     const std::string_view type = QuantizedMeshContentType(extensions);
-    EXPECT_TRUE(type.starts_with(kQuantizedMeshType));
-    EXPECT_EQ(type == kQuantizedMeshType, bits == 0);
+    EXPECT_TRUE(type.starts_with("application/vnd.quantized-mesh"));
+    EXPECT_EQ(type == "application/vnd.quantized-mesh", bits == 0);
     EXPECT_EQ(ExtensionsInAccept(type), extensions) << type;
   }
 }

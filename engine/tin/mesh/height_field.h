@@ -17,7 +17,7 @@ namespace terrace::tin {
 
 class HeightField {
  public:
-  // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
+  // Coordinates stay below 2^15, which keeps the in-circle test inside 64 bits (triangulation.h).
   static constexpr int kMaxSide = 1 << 15;
 
   // `heights` has width * height values in metres, row by row. The vector is not copied if height >= 8 and its capacity

@@ -184,7 +184,7 @@ class Triangulation {
 constexpr std::int32_t Cross(const RingVertex& a, const RingVertex& b) { return a.dx * b.dy - a.dy * b.dx; }
 
 // Whether the point p that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
-// counter-clockwise. This is the in-circle test of predicates.h in another form: p is inside if the angles at p and at
+// counter-clockwise. This is the in-circle determinant in another form: p is inside if the angles at p and at
 // w over the chord (u, v) add up to more than half a turn, that is, if the sine of their sum, times four lengths, is
 // negative. Two of the four factors do not depend on w, so they are computed while w is loaded. Width: differences of
 // coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, with a margin of about 2^17, and
