@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <iterator>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "engine/tin/scan/triangle_rows.h"
+#include "tiler/mesh/refine_options.h"
 
 namespace terrace::tiler {
 namespace {
@@ -75,19 +74,10 @@ geo::Vec3 AreaSurface::Ecef(int column, int row, double height_m) const {
 
 void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
   const double step = lattice_.StepDegrees(), radians = geo::ToRadians(step);
-  std::vector<double>& east = options.curvature.east_m2;
-  for (int j = 0; j < window_.rows; ++j) {
-    const double metres = geo::MetresPerDegreeEast(At(0, j).latitude) * step;
-    east.push_back(metres * metres);
-  }
-  // Near the equator neighbouring rows differ by less than the rounding of their sines; Curvature requires them to
-  // increase up to the widest row and decrease after it.
-  const auto wider = [](double a, double b) { return std::max(a, b); };
-  const auto widest = std::max_element(east.begin(), east.end());
-  std::inclusive_scan(east.begin(), widest, east.begin(), wider);
-  std::inclusive_scan(east.rbegin(), std::make_reverse_iterator(widest), east.rbegin(), wider);
-  options.curvature.north_m2 = radians * geo::kLargestRadius * radians * geo::kLargestRadius;
-  options.curvature.radius_m = geo::kSmallestRadius;
+  std::vector<double> latitudes;
+  for (int j = 0; j < window_.rows; ++j) latitudes.push_back(At(0, j).latitude);
+  options.curvature = {EastSteps(latitudes, step), radians * geo::kLargestRadius * radians * geo::kLargestRadius,
+                       geo::kSmallestRadius};
   for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
     const bool is_parallel = side == tin::Side::kSouth || side == tin::Side::kNorth;
     const double latitude = At(0, side == tin::Side::kSouth ? 0 : window_.rows - 1).latitude;

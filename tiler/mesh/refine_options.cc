@@ -29,24 +29,10 @@ double GridSagitta(int level, int divisions) {
 
 tin::Curvature MakeCurvature(const proto::TileSamples& samples) {
   const double step = samples.lattice.StepDegrees();
-  tin::Curvature curvature;
   std::vector<double> latitudes;
   for (int j = 0; j <= samples.cells(); ++j) latitudes.push_back(samples.Latitude(j));
-  for (const geo::SinCos& latitude : geo::RoundedSinCosOf(latitudes)) {
-    const double east = geo::MetresPerDegreeEast(latitude) * step;
-    curvature.east_m2.push_back(east * east);
-  }
-  // Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the
-  // widest row and decrease after it, as Curvature requires.
-  const auto wider = [](double a, double b) { return std::max(a, b); };
-  const auto begin = curvature.east_m2.begin(), widest = std::max_element(begin, curvature.east_m2.end());
-  std::inclusive_scan(begin, widest, begin, wider);
-  const auto back = curvature.east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
-  std::inclusive_scan(back, widest_back, back, wider);
   const double north = geo::ToRadians(step) * geo::kLargestRadius;
-  curvature.north_m2 = north * north;
-  curvature.radius_m = geo::kSmallestRadius;
-  return curvature;
+  return {EastSteps(latitudes, step), north * north, geo::kSmallestRadius};
 }
 
 // Triangles with a sagitta above half of the error leave too little of the error for relief. Therefore the next finer
@@ -84,6 +70,22 @@ double PositionRounding(const proto::TileSamples& samples, tin::Side side) {
 }
 
 }  // namespace
+
+// Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the
+// widest row and decrease after it, as Curvature requires.
+std::vector<double> EastSteps(std::span<const double> latitudes, double step) {
+  std::vector<double> east_m2;
+  for (const geo::SinCos& latitude : geo::RoundedSinCosOf(latitudes)) {
+    const double east = geo::MetresPerDegreeEast(latitude) * step;
+    east_m2.push_back(east * east);
+  }
+  const auto wider = [](double a, double b) { return std::max(a, b); };
+  const auto begin = east_m2.begin(), widest = std::max_element(begin, east_m2.end());
+  std::inclusive_scan(begin, widest, begin, wider);
+  const auto back = east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
+  std::inclusive_scan(back, widest_back, back, wider);
+  return east_m2;
+}
 
 // Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
 // error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the

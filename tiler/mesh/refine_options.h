@@ -4,12 +4,18 @@
 // do not depend on the error: a refinement serves every error (engine/tin/refinement.h).
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "engine/dem/elevation_model.h"
 #include "engine/tin/greedy.h"
 #include "proto/mesh/edge_steps.h"
 #include "proto/tile_samples.h"
 
 namespace terrace::tiler {
+
+// Curvature::east_m2 of rows at these latitudes; `step`: degrees between columns.
+std::vector<double> EastSteps(std::span<const double> latitudes, double step);
 
 // `finest`: height steps of the edges for the smallest error (MakeEdgeSteps).
 tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& finest);
