@@ -100,17 +100,6 @@ void GridSight::Scan::MeasureSmooth(const Clearance& clearance, double first, do
   }
 }
 
-SightAnswer SightSearch::Answer(bool has_gaps) const {
-  SightAnswer answer;
-  answer.has_gaps = has_gaps;
-  if (clearance_m_ == kNone) return answer;
-  answer.clearance_m = clearance_m_;
-  answer.clearance_at = clearance_at_;
-  answer.is_visible = blocked_at_ == kNone;
-  if (!answer.is_visible) answer.blocked_at = blocked_at_;
-  return answer;
-}
-
 Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
                                                SightSurface surface, SightSearch& search, const std::stop_token& stop) {
   const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());

@@ -47,6 +47,17 @@ SightPoint RayCourse::At(double share) const {
   return point;
 }
 
+SightAnswer SightSearch::Answer(bool has_gaps) const {
+  SightAnswer answer;
+  answer.has_gaps = has_gaps;
+  if (clearance_m_ == kNone) return answer;
+  answer.clearance_m = clearance_m_;
+  answer.clearance_at = clearance_at_;
+  answer.is_visible = blocked_at_ == kNone;
+  if (!answer.is_visible) answer.blocked_at = blocked_at_;
+  return answer;
+}
+
 double LengthOf(const SightRay& ray) { return RayCourse(ray, {}).length_m(); }
 
 SightPoint PointAt(const SightRay& ray, double share, const SightOptions& options) {

@@ -1,6 +1,7 @@
-// Lines of sight: plain values.
+// Lines of sight: rays, and what is known of them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -38,6 +39,26 @@ inline constexpr double kSightTolerance = 1e-3;
 // Metres. The longest ray that ElevationModel::LookAlong accepts: a precondition, which is not checked. Points near the
 // ground that are farther apart never see each other.
 inline constexpr double kMaxSightLength = 3e6;
+
+// What is known of a ray so far.
+class SightSearch {
+ public:
+  // Whether a part of the ray that begins at `start` and has at least this clearance can be skipped.
+  bool IsSettled(double clearance_m, double start) const {
+    return clearance_m >= clearance_m_ && (clearance_m >= -kSightTolerance || start >= blocked_at_);
+  }
+  // A clearance of the ray at a share of its length.
+  void Add(double clearance_m, double at) {
+    if (clearance_m < clearance_m_) clearance_m_ = clearance_m, clearance_at_ = at;
+  }
+  void AddBlocked(double at) { blocked_at_ = std::min(blocked_at_, at); }
+  bool IsBlockedBefore(double at) const { return blocked_at_ <= at; }
+  SightAnswer Answer(bool has_gaps) const;
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  double clearance_m_ = kNone, clearance_at_ = 0, blocked_at_ = kNone;
+};
 
 // Metres, along the chord.
 double LengthOf(const SightRay& ray);

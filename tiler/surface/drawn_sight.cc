@@ -23,44 +23,24 @@ double Bisect(const dem::Quadratic& along, double value, double low, double high
   return high;
 }
 
-// The clearances of one ray.
-class Clearances {
- public:
-  void Add(const dem::Quadratic& over, double from, double to, double start, double length) {
-    const auto share = [&](double s) { return start + s * length; };
-    const double a = over.square_factor();
-    const double vertex = a > 0 ? std::clamp(-over.Slope(0) / (2 * a), from, to) : from;
-    for (const double s : {from, vertex, to}) {
-      const double clearance_m = over.At(s);
-      if (clearance_m < min_) min_ = clearance_m, at_ = share(s);
-    }
-    if (over.At(from) < -dem::kSightTolerance) {
-      blocked_at_ = std::min(blocked_at_, share(from));
-      return;
-    }
-    for (const double s : {vertex, to}) {
-      if (over.At(s) >= -dem::kSightTolerance) continue;
-      blocked_at_ = std::min(blocked_at_, share(Bisect(over, -dem::kSightTolerance, s, from)));
-      return;
-    }
+// Adds the clearances of a part of a ray: `over`, between `from` and `to`, where s is the share start + s * length of
+// the ray.
+void AddClearances(const dem::Quadratic& over, double from, double to, double start, double length,
+                   dem::SightSearch& search) {
+  const auto share = [&](double s) { return start + s * length; };
+  const double a = over.square_factor();
+  const double vertex = a > 0 ? std::clamp(-over.Slope(0) / (2 * a), from, to) : from;
+  for (const double s : {from, vertex, to}) search.Add(over.At(s), share(s));
+  if (over.At(from) < -dem::kSightTolerance) {
+    search.AddBlocked(share(from));
+    return;
   }
-  // A part of the ray is above a hole.
-  void AddGap() { has_gaps_ = true; }
-  dem::SightAnswer Answer() const {
-    dem::SightAnswer answer;
-    answer.has_gaps = has_gaps_;
-    if (std::isinf(min_)) return answer;
-    answer.clearance_m = min_, answer.clearance_at = at_;
-    answer.is_visible = std::isinf(blocked_at_);
-    if (!answer.is_visible) answer.blocked_at = blocked_at_;
-    return answer;
+  for (const double s : {vertex, to}) {
+    if (over.At(s) >= -dem::kSightTolerance) continue;
+    search.AddBlocked(share(Bisect(over, -dem::kSightTolerance, s, from)));
+    return;
   }
-
- private:
-  double min_ = std::numeric_limits<double>::infinity(), at_ = 0;
-  double blocked_at_ = std::numeric_limits<double>::infinity();
-  bool has_gaps_ = false;
-};
+}
 
 // A part of the surface that one list of triangles covers: degrees.
 struct Region {
@@ -134,7 +114,8 @@ class MeshWalk {
 
   // Divides a ray where it leaves a region.
   Result<dem::SightAnswer> Look(const dem::SightRay& ray) {
-    Clearances clearances;
+    dem::SightSearch search;
+    has_gaps_ = false;
     const dem::RayCourse course(ray, options_);
     const BorderCrossings borders(course);
     const double length_m = course.length_m();
@@ -154,11 +135,11 @@ class MeshWalk {
       while (next - share > min_step && !region.Contains(PlaceAt(course, (share + next) / 2)))
         next = (share + next) / 2;
       next = std::min(1.0, std::max(next, share + min_step));
-      const Result<void> added = AddPart(course, {share, next}, *tile, **mesh, bucket.triangles, clearances);
+      const Result<void> added = AddPart(course, {share, next}, *tile, **mesh, bucket.triangles, search);
       if (!added) return tl::unexpected(added.error());
       share = next;
     }
-    return clearances.Answer();
+    return search.Answer(has_gaps_);
   }
 
  private:
@@ -177,7 +158,7 @@ class MeshWalk {
   // `triangles` lie over the part, which is short enough that heights and barycentric coordinates along it are
   // polynomials of the second degree.
   Result<void> AddPart(const dem::RayCourse& ray, const Interval& part, std::uint32_t tile, const DrawnMesh& mesh,
-                       std::span<const std::uint32_t> triangles, Clearances& clearances) {
+                       std::span<const std::uint32_t> triangles, dem::SightSearch& search) {
     std::array<dem::SightPoint, 3> points;
     for (std::size_t i = 0; i < 3; ++i) points[i] = ray.At(part.At(static_cast<double>(i) / 2));
     const auto place = [&](std::size_t i) { return dem::GeoPosition{points[i].longitude, points[i].latitude}; };
@@ -201,19 +182,19 @@ class MeshWalk {
       if (over.from > over.to) continue;
       covered_.push_back(over);
       if (mesh.IsInHole(triangle)) {
-        clearances.AddGap();
+        has_gaps_ = true;
         continue;
       }
       const dem::Quadratic clearance{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
                                      points[2].height_m - last->height_m};
-      clearances.Add(clearance, over.from, over.to, part.from, part.to - part.from);
+      AddClearances(clearance, over.from, over.to, part.from, part.to - part.from, search);
     }
     std::ranges::sort(covered_, {}, &Interval::from);
     covered_.push_back({1, 1});
     double reached = 0;
     for (const Interval& over : covered_) {
       if (over.from - reached > kMinBare) {
-        const Result<void> added = AddBare(ray, {part.At(reached), part.At(over.from)}, tile, clearances);
+        const Result<void> added = AddBare(ray, {part.At(reached), part.At(over.from)}, tile, search);
         if (!added) return added;
       }
       reached = std::max(reached, over.to);
@@ -223,7 +204,7 @@ class MeshWalk {
 
   // A part above none of the triangles: beside the tile's edge, within the distance of a chord from its parallel, in a
   // hole, or where the list lacks a triangle.
-  Result<void> AddBare(const dem::RayCourse& ray, const Interval& part, std::uint32_t tile, Clearances& clearances) {
+  Result<void> AddBare(const dem::RayCourse& ray, const Interval& part, std::uint32_t tile, dem::SightSearch& search) {
     std::array<double, 3> over{};
     for (std::size_t i = 0; i < 3; ++i) {
       const dem::SightPoint point = ray.At(part.At(static_cast<double>(i) / 2));
@@ -231,10 +212,10 @@ class MeshWalk {
       if (!read) return tl::unexpected(read.error());
       over[i] = point.height_m - read->point.height_m;
       if (!std::isnan(over[i])) continue;
-      clearances.AddGap();
+      has_gaps_ = true;
       return {};
     }
-    clearances.Add({over[0], over[1], over[2]}, 0, 1, part.from, part.to - part.from);
+    AddClearances({over[0], over[1], over[2]}, 0, 1, part.from, part.to - part.from, search);
     return {};
   }
 
@@ -245,6 +226,7 @@ class MeshWalk {
   const dem::SightOptions& options_;
   const std::stop_token& stop_;
   std::vector<Interval> covered_;  // by triangles of the current part
+  bool has_gaps_ = false;          // of the current ray
 };
 
 double TotalLength(std::span<const dem::SightRay> rays) {
