@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/core/elapsed_time.h"
+#include "engine/dem/tile_edits.h"
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/gltf/glb_tile.h"
@@ -43,6 +44,7 @@ struct MeshedGlb {
   std::chrono::microseconds replay_time{};  // of ReplayMesh
   tin::TinMesh tin;                         // without skirts
   std::vector<geo::Vec3> positions;         // of its vertices
+  std::vector<std::uint8_t> in_hole;        // by its triangles (edit_limits.h)
 };
 
 // Starts from the same mesh as a quantized-mesh tile of this error (ReplayMesh), and rounds its vertices to the
@@ -61,7 +63,8 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samp
   meshed.replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 
   tin::TinMesh& mesh = replayed->mesh;
-  const tin::SampleLimits limits = LimitsOf(*dataset.model, samples.key);
+  const dem::MeshDemands demands = dem::TileEdits(*dataset.model).DemandsOf(samples.key);
+  const tin::SampleLimits limits = LimitsOf(demands);
   std::vector<float> allowed = AllowedErrors(limits, replayed->error_m);
   double min_m = wanted_error_m;
   for (const float error_m : allowed) min_m = std::min(min_m, static_cast<double>(error_m));
@@ -85,9 +88,10 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samp
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = proto::MeasureFlatSurfaceError(samples, mesh, positions, error->max_m);
+  meshed.in_hole = TrianglesInHoles(demands, samples.cells() + 1, mesh);
   meshed.mesh =
       proto::MakeGridMesh(samples, mesh, points, RoundedNormals(proto::VertexNormals(samples, mesh, positions)), step_m,
-                          depth_m, TrianglesInHoles(*dataset.model, samples.key, mesh));
+                          depth_m, meshed.in_hole);
   meshed.tin = std::move(mesh);
   meshed.positions = std::move(positions);
   return meshed;
@@ -134,7 +138,7 @@ Result<DrawnTriangles> GlbTriangles(const EncoderInput& input, const std::stop_t
   for (const tin::SamplePosition& vertex : meshed->tin.vertices)
     drawn.places.push_back({vertex.x / cells, vertex.y / cells});
   drawn.positions = std::move(meshed->positions);
-  drawn.in_hole = TrianglesInHoles(*input.dataset.model, input.request.key, meshed->tin);
+  drawn.in_hole = std::move(meshed->in_hole);
   drawn.triangles = std::move(meshed->tin.triangles);
   return drawn;
 }

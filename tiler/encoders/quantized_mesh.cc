@@ -63,11 +63,11 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
 }  // namespace
 
 Result<DrawnTriangles> QuantizedMeshTriangles(const EncoderInput& input, const std::stop_token& stop) {
-  const Result<MeshedTile> meshed = MeshTile(*input.dataset.model, input.samples(), input.refined->refinement,
-                                             input.dataset.mesh_options, input.error_m, stop);
+  Result<MeshedTile> meshed = MeshTile(*input.dataset.model, input.samples(), input.refined->refinement,
+                                       input.dataset.mesh_options, input.error_m, stop);
   if (!meshed) return tl::unexpected(meshed.error());
   DrawnTriangles drawn = TrianglesOf(meshed->tile);
-  drawn.in_hole = TrianglesInHoles(*input.dataset.model, meshed->tile.key, meshed->mesh);
+  drawn.in_hole = std::move(meshed->in_hole);
   return drawn;
 }
 
@@ -85,8 +85,7 @@ Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encod
   }
   const Result<proto::TileExtensions> extensions = AddExtensions(dataset, request, samples, measured->tile, stop);
   if (!extensions) return tl::unexpected(extensions.error());
-  LeaveOut(TrianglesInHoles(*dataset.model, request.key, measured->mesh), measured->mesh, samples.cells(),
-           measured->tile.triangles);
+  LeaveOut(measured->in_hole, measured->mesh, samples.cells(), measured->tile.triangles);
   encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *extensions, measured->positions);
   encoded.times.refine += measured->replay_time;
   encoded.times.encode = MicrosecondsSince(start) - measured->replay_time;

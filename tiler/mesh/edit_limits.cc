@@ -21,10 +21,6 @@ float RoundedDown(double value) {
 
 }  // namespace
 
-tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key) {
-  return LimitsOf(dem::TileEdits(model).DemandsOf(key));
-}
-
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
   for (float& cap : demands.caps) cap = RoundedDown(ErrorAllowedAtSamples(static_cast<double>(cap)));
@@ -78,11 +74,6 @@ proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::Tile
   if (key.y == 0) errors.side[0] = errors.corner[0] = errors.corner[1] = errors.tile;
   if (key.y + 1 == geo::TileRows(key.level)) errors.side[2] = errors.corner[2] = errors.corner[3] = errors.tile;
   return errors;
-}
-
-std::vector<std::uint8_t> TrianglesInHoles(const dem::ElevationModel& model, const geo::TileKey& key,
-                                           const tin::TinMesh& mesh) {
-  return TrianglesInHoles(dem::TileEdits(model).DemandsOf(key), model.LatticeOf(key.level).cells + 1, mesh);
 }
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh) {

@@ -13,9 +13,7 @@
 
 namespace terrace::tiler {
 
-// The limits that edits set for the samples of a tile; empty: none. Depends on the edits and the key, not on heights.
-tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key);
-
+// The limits that edits set for the samples of a tile or another field; empty: none.
 tin::SampleLimits LimitsOf(dem::MeshDemands demands);
 
 // The error that each sample may have in a tile of this error, row by row; empty: `error_m` everywhere.
@@ -29,9 +27,7 @@ proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::Tile
 
 // Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each node that it
 // covers, corners included, is in the hole or forced (MeshDemands), and at least one is in the hole.
-std::vector<std::uint8_t> TrianglesInHoles(const dem::ElevationModel& model, const geo::TileKey& key,
-                                           const tin::TinMesh& mesh);
-// The same for a field of `width` nodes a row.
+// `width`: nodes in a row of the field.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh);
 
 // Removes the triangles in holes. Vertices on the tile's edges stay, because clients need the lists of edges. An edge

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/dem/tile_edits.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "proto/error/surface_error.h"
@@ -26,8 +27,8 @@ using Clock = std::chrono::steady_clock;
 
 // Quantizes, and inserts the samples that quantization pushed over the bound.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::TileSamples& samples, const proto::EdgeSteps& steps,
-                          const tin::SampleLimits& limits, double error_m, const std::stop_token& stop) {
-  proto::TileErrorMeter meter(samples, error_m, AllowedErrors(limits, error_m));
+                          const dem::MeshDemands& demands, double error_m, const std::stop_token& stop) {
+  proto::TileErrorMeter meter(samples, error_m, AllowedErrors(LimitsOf(demands), error_m));
   MeshedTile meshed;
   const auto measure = [&](const tin::TinMesh& candidate) {
     meshed.tile = proto::QuantizeTile(samples, candidate, steps);
@@ -38,6 +39,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::TileSamples& samples, 
   meshed.max_error_m = measured->max_m;
   meshed.positions = meter.positions();
   meshed.surface_error_m = proto::MeasureSurfaceError(samples, meshed.tile, meshed.positions, measured->max_m);
+  meshed.in_hole = TrianglesInHoles(demands, samples.cells() + 1, mesh);
   meshed.mesh = std::move(mesh);
   return meshed;
 }
@@ -117,15 +119,15 @@ Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::T
 Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
                             const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
                             double wanted_error_m, const std::stop_token& stop) {
-  const tin::SampleLimits limits = LimitsOf(model, samples.key);
+  const dem::MeshDemands demands = dem::TileEdits(model).DemandsOf(samples.key);
   const proto::EdgeSteps steps =
-      EdgeStepsOf(model, samples.key, EdgeErrorsOf(model, samples.key, limits, wanted_error_m));
+      EdgeStepsOf(model, samples.key, EdgeErrorsOf(model, samples.key, LimitsOf(demands), wanted_error_m));
   const Clock::time_point start = Clock::now();
   Result<ReplayedMesh> replayed = ReplayMesh(model, samples, refinement, mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());
   double error_m = replayed->error_m;
   const auto replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), samples, steps, limits, error_m, stop);
+  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), samples, steps, demands, error_m, stop);
   if (meshed) meshed->replay_time = replay_time;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
@@ -133,7 +135,7 @@ Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileS
   Result<tin::TinMesh> mesh = RefineWithinFormat(
       FieldOf(samples), RefineOptionsOf(model, samples, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  meshed = Finish(*std::move(mesh), samples, steps, limits, error_m, stop);
+  meshed = Finish(*std::move(mesh), samples, steps, demands, error_m, stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
     return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(samples.key));
   }

@@ -20,6 +20,7 @@ namespace terrace::tiler {
 
 struct MeshedTile {
   tin::TinMesh mesh;
+  std::vector<std::uint8_t> in_hole;  // by triangle, as TrianglesInHoles (edit_limits.h)
   proto::QuantizedTile tile;
   std::vector<geo::Vec3> positions;         // of its vertices, ECEF
   double max_error_m = 0;                   // measured on the encoded integers

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 
+#include "engine/dem/tile_edits.h"
 #include "tests/engine/dem/edits_fixture.h"
 
 namespace terrace::tiler {
@@ -36,7 +37,8 @@ TEST(EdgeErrors, AreThoseOfTheTileOnAPole) {
     const std::int64_t column = (1 << kLevel) + 8, row = is_north ? geo::TileRows(kLevel) - 1 : 0;
     for (const std::int64_t dx : {-1, 0}) {
       const geo::TileKey key{kLevel, column + dx, row};
-      const proto::EdgeErrors errors = EdgeErrorsOf(*source, key, LimitsOf(*source, key), kError_m);
+      const proto::EdgeErrors errors =
+          EdgeErrorsOf(*source, key, LimitsOf(dem::TileEdits(*source).DemandsOf(key)), kError_m);
       const std::size_t meridian = dx == 0 ? 3 : 1;
       EXPECT_LT(errors.side[meridian], 1);
       // Corners in the order south-west, south-east, north-east, north-west.
