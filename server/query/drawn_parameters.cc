@@ -49,7 +49,7 @@ Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
   if (drawn.format != tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
   }
-  return SetOneOf(drawn.compression, "compression", *texts.compression, proto::kGlbCompressionNames);
+  return SetOneOf(drawn.compression.emplace(), "compression", *texts.compression, proto::kGlbCompressionNames);
 }
 
 }  // namespace

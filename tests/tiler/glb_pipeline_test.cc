@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
@@ -212,6 +213,31 @@ TEST(GlbPipeline, FormatsShareOneRefinement) {
   const Result<EncodedTile> glb = pipeline.Build(request, {});
   EXPECT_EQ(glb->refinement_use, RefinementUse::kReplayed);
   EXPECT_EQ(glb->times.read.count(), 0);
+}
+
+// The tiles that a client gets without the parameter `compression` have the dataset's form.
+TEST(GlbPipeline, HeightsOfGlbTilesAreThoseOfTheDatasetsForm) {
+  std::vector<dem::GeoPosition> points;
+  for (int k = 0; k < 20; ++k) points.push_back({-84.2 + 0.003 * k, 36.3 + 0.002 * k});
+  for (const auto& [form, other] : {std::pair(GlbCompression::kQuantized, GlbCompression::kDraco),
+                                    std::pair(GlbCompression::kMeshopt, GlbCompression::kDraco),
+                                    std::pair(GlbCompression::kDraco, GlbCompression::kQuantized)}) {
+    std::vector<Dataset> datasets;
+    datasets.push_back(OpenSample("jacksboro"));
+    datasets[0].glb.compression = form;
+    const TilePipeline pipeline(std::move(datasets));
+    const auto heights_of = [&](std::optional<GlbCompression> compression) {
+      DrawnSurface surface;
+      surface.format = TileFormat::kGlb;
+      surface.compression = compression;
+      const auto heights = pipeline.ReadDrawnPoints(0, surface, points, false, {});
+      EXPECT_TRUE(heights) << (heights ? "" : heights.error().message);
+      return heights ? heights->heights : std::vector<float>();
+    };
+    const std::vector<float> of_dataset = heights_of(std::nullopt);
+    EXPECT_EQ(of_dataset, heights_of(form));
+    EXPECT_NE(of_dataset, heights_of(other));
+  }
 }
 
 TEST(GlbPipeline, GivesTheSameBytesOnEveryThreadAndFromEveryRefinement) {

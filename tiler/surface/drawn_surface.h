@@ -16,8 +16,8 @@ struct DrawnSurface {
   // error_m is not set.
   std::optional<int> level;
   RequestedError requested = {};
-  TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb, only if the dataset has sources
-  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+  TileFormat format = TileFormat::kQuantizedMesh;         // or kGlb, only if the dataset has sources
+  std::optional<proto::GlbCompression> compression = {};  // kGlb only; nothing: Dataset::glb.compression
 };
 
 // Level of the surface. kInvalidArgument: the dataset has no such level.

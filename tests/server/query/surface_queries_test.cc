@@ -85,6 +85,8 @@ TEST(DrawnSurface, ReadsTheParametersOfTiles) {
   EXPECT_TRUE(query->drawn->requested.at_least);
   EXPECT_EQ(query->drawn->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(query->drawn->compression, proto::GlbCompression::kMeshopt);
+  EXPECT_FALSE(ParseHeights({"locations=1,2&surface=served&format=glb", {}, {}}, 9)->drawn->compression)
+      << "the dataset's";
   EXPECT_FALSE(ParseHeights({"locations=1,2&surface=source", {}, {}}, 9)->drawn);
   EXPECT_TRUE(ParseHeights({"locations=1,2&surface=served&atleast=0", {}, {}}, 9)) << "as on URLs of tiles";
 }
