@@ -28,10 +28,13 @@ asio::awaitable<void> Pause() {
 }
 
 // Unknown names must not become labels of metrics.
+bool NamesDataset(const Route& route, const Catalog& catalog) {
+  return !route.dataset.empty() && FindDataset(route.dataset, catalog.datasets);
+}
+
 void SetLabels(const RequestContext& context, const HandlerState& state, Response& response) {
   response.labels.route = context.route.row->label;
-  const std::string& dataset = context.route.dataset;
-  if (!dataset.empty() && FindDataset(dataset, state.catalog->datasets)) response.labels.subject = dataset;
+  if (NamesDataset(context.route, *state.catalog)) response.labels.subject = context.route.dataset;
 }
 
 }  // namespace
@@ -96,11 +99,8 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     return refusal ? std::move(refusal) : ClientErrorResponse(error, context_.request->id);
   }
   std::optional<Response> Refuse() const {
-    std::optional<Response> refusal = RefuseMethod(context_.route.row->takes_post());
-    if (refusal) return refusal;
-    refusal = application_.parts_.limits.admission_control.Refuse(context_);
-    if (refusal) refusal->labels.route = context_.route.row->label;
-    return refusal;
+    if (std::optional<Response> refusal = RefuseMethod(context_.route.row->takes_post())) return refusal;
+    return application_.parts_.limits.admission_control.Refuse(context_);
   }
 
   // A dataset that is not open yet.
@@ -109,9 +109,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     if (std::ranges::find(names, context_.route.dataset) == names.end()) return std::nullopt;
     for (const PendingDataset& pending : application_.PendingOf(*state.catalog)) {
       if (pending.name != context_.route.dataset) continue;
-      Response response = PendingResponse(pending, context_.request->id);
-      response.labels.route = context_.route.row->label;
-      return response;
+      return PendingResponse(pending, context_.request->id);
     }
     return std::nullopt;
   }
@@ -129,7 +127,6 @@ asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
   if (!co_await application_.FirstCatalog(context_.request->deadline)) {
     Response response = ProblemResponse(503, "the sources are being opened", context_.request->id);
     response.headers.emplace_back("Retry-After", "5");
-    response.labels.route = context_.route.row->label;
     co_return response;
   }
   Answer answer = Handle(*context_.request);
@@ -159,6 +156,12 @@ asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlerStatePtr st
 
 void TerrainApplication::Handler::Report(const SentReply& reply) {
   ReplyRecord record = RecordOf(reply);
+  // Refusals and requests whose client has left have no labels yet.
+  const Route& route = context_.route;
+  if (reply.has_valid_head && route.row != nullptr && record.route == Response::Labels().route) {
+    record.route = route.row->label;
+    if (NamesDataset(route, *application_.catalog())) record.dataset = route.dataset;
+  }
   if (reply.has_valid_head && client_.address != peer_.address) record.client = client_.text;
   if (reply.has_valid_head && context_.grant) record.token_name = context_.grant->name;
   application_.parts_.metrics.CountReply(record);

@@ -146,7 +146,6 @@ Response AdmissionControl::TooManyRequests(const RateLimiter::Turn& turn, const 
   Response response = ProblemResponse(429, "too many requests", context.request->id);
   const std::int64_t seconds = (turn.wait.count() + 999) / 1000;
   response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>(seconds, 1)));
-  if (context.route.row != nullptr) response.labels.route = context.route.row->label;
   return response;
 }
 

@@ -127,7 +127,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ServeOne();
   asio::awaitable<void> RefuseMessage(BadRequest why);
   asio::awaitable<bool> ReceiveBody();
-  asio::awaitable<void> RefuseUpload();
+  asio::awaitable<bool> RefuseUpload();
   asio::awaitable<void> DelayRefusal();
   asio::awaitable<std::monostate> Sleep(std::chrono::milliseconds time);
   asio::awaitable<bool> GiveUp();
@@ -236,10 +236,7 @@ asio::awaitable<bool> Session::ServeOne() {
 // For a request whose answer nobody waits for: the connection has ended, or others get the request's memory. Returns
 // false, for the caller to return: the connection must be closed.
 asio::awaitable<bool> Session::GiveUp() {
-  if (displaced_) {
-    co_await RefuseUpload();
-    co_return false;
-  }
+  if (displaced_) co_return co_await RefuseUpload();
   Response unsent;
   unsent.status = kClientLeft;
   Report(unsent, 0);
@@ -267,10 +264,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
     upload.holder = weak_from_this();
     auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(upload), request.deadline));
     if (!room) co_return co_await GiveUp();
-    if (!*room) {
-      co_await RefuseUpload();
-      co_return false;
-    }
+    if (!*room) co_return co_await RefuseUpload();
     body->room = **std::move(room);
     has_upload_ = true;
     if (!displaced_) {
@@ -281,26 +275,29 @@ asio::awaitable<bool> Session::ReceiveBody() {
     }
   }
   is_receiving_ = false;
-  if (displaced_) {
+  if (displaced_ || (!read && read.error().status == 0)) {
     body.reset();  // release its memory while waiting
-    co_await RefuseUpload();
+    co_return co_await GiveUp();
   }
-  if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
-  if (!read || displaced_) co_return false;
+  if (!read) {
+    co_await RefuseMessage(read.error());
+    co_return false;
+  }
   phase_.store(Phase::kServes, std::memory_order_relaxed);
   body->room.EndUpload();
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
 }
 
-// Others get its memory: release the body.
-asio::awaitable<void> Session::RefuseUpload() {
+// Others get its memory: release the body. Returns false, as GiveUp does.
+asio::awaitable<bool> Session::RefuseUpload() {
   exchange_.request.body = RequestBody();
   has_upload_ = is_receiving_ = false;
   Response response = OverloadedResponse("too many request bodies are on their way", exchange_.request.id);
   response.close = true;
   co_await DelayRefusal();
   co_await Reply(response);
+  co_return false;
 }
 
 asio::awaitable<void> Session::DelayRefusal() {

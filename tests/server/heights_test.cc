@@ -207,6 +207,36 @@ TEST_F(HeightsTest, ClosesSlowBodies) {
   EXPECT_EQ(reads_, 0);
 }
 
+TEST_F(HeightsTest, RefusedAndAbandonedBodiesAreCountedForTheirRouteAndDataset) {
+  ServerOptions options;
+  options.config.header_timeout = 200ms;
+  options.config.max_locations = 10;
+  StartHeights(options);
+  const auto status_of = [&](const std::string& request) {
+    RawClient client(port());
+    client.Send(request);
+    const auto reply = client.Read();
+    return reply ? reply->status : 0;
+  };
+  const std::string large(5000, ' ');
+  EXPECT_EQ(status_of(Post("/maui/heights", large)), 413);
+  EXPECT_EQ(status_of(Post("/maui/heights", "{}", "Content-Encoding: gzip\r\n")), 415);
+  EXPECT_EQ(status_of(Post("/nope/heights", large)), 413);
+  const std::string unfinished = "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Length: 20\r\n\r\n{";
+  EXPECT_EQ(status_of(unfinished), 408);
+  RawClient leaves(port());
+  leaves.Send("POST /maui/heights HTTP/1.1\r\nHost: x\r\nExpect: 100-continue\r\nContent-Length: 20\r\n\r\n");
+  EXPECT_EQ(leaves.Read(/*head=*/true)->status, 100) << "the server waits for the body";
+  leaves.Reset();
+  for (const char* labels :
+       {R"(dataset="maui",route="heights",status="413")", R"(dataset="",route="heights",status="413")",
+        R"(dataset="maui",route="heights",status="415")", R"(dataset="maui",route="heights",status="408")",
+        R"(dataset="maui",route="heights",status="499")"}) {
+    const std::string line = "terrace_http_requests_total{" + std::string(labels) + "} 1\n";
+    EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/metrics").body.find(line) != std::string::npos; })) << labels;
+  }
+}
+
 TEST_F(HeightsTest, GivesUpAtTheDeadlineAndStopsReading) {
   ServerOptions options;
   options.config.request_deadline = 200ms;

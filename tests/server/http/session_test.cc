@@ -181,5 +181,18 @@ TEST_F(Sessions, ReportsAClientThatLeavesWhileItWaitsForItsTurn) {
   EXPECT_EQ(echo_.reports[0].status, 499);
 }
 
+TEST_F(Sessions, ReportsAClientThatLeavesDuringItsBody) {
+  Ends ends(io_);
+  asio::write(ends.client, asio::buffer(std::string("POST /late HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\n\r\nb")));
+  StartSession(std::move(ends.server), context_, "");
+  while (echo_.at_admission.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+  }
+  ends.client.close();
+  RunUntilReported();
+  ASSERT_EQ(echo_.reports.size(), 1u);
+  EXPECT_EQ(echo_.reports[0].status, 499);
+  EXPECT_TRUE(echo_.targets.empty()) << "there was nothing to answer";
+}
+
 }  // namespace
 }  // namespace terrace::server
