@@ -1,8 +1,11 @@
 #include "server/jobs/worker_pool.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <chrono>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -24,10 +27,15 @@ void Wake(WaiterPtr waiter) {
 }
 
 Error FailureOf(std::string_view name, const std::exception& thrown) {
+  const bool is_memory_short = dynamic_cast<const std::bad_alloc*>(&thrown) != nullptr;
+  const ErrorCode code = is_memory_short ? ErrorCode::kOverloaded : ErrorCode::kInternal;
   try {
-    return Error{ErrorCode::kUnavailable, std::string(name) + ": " + thrown.what()};
+    // Logged here, because the log leaves out other refusals under load.
+    if (is_memory_short)
+      spdlog::warn("{}: no memory; give the process more, or lower cache_bytes or worker_threads", name);
+    return Error{code, std::string(name) + ": " + (is_memory_short ? "no memory" : thrown.what())};
   } catch (const std::exception&) {
-    return Error{ErrorCode::kUnavailable, "no memory"};  // no memory for a longer message either
+    return Error{code, "no memory"};  // no memory for a longer message either
   }
 }
 
@@ -55,7 +63,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
   PoolJobPtr dropped;
   {
     const std::lock_guard lock(mutex_);
-    if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
+    if (cancel_.stop_requested()) return MakeError(ErrorCode::kCancelled, "the server is shutting down");
     const JobClock::time_point now = now_();
     if (job->terms.deadline <= now) return MakeError(ErrorCode::kCancelled, "the request's deadline has passed");
     // Compared in seconds, because a deadline may be time_point::max().

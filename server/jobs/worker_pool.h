@@ -43,12 +43,14 @@ void Wake(WaiterPtr waiter);
 template <typename T>
 using Work = std::function<Result<T>(std::stop_token)>;
 
-// kUnavailable, with the message of the exception that the work `name` has thrown. Never throws.
+// The error of an exception that the work `name` has thrown. kOverloaded: memory is short, which is also logged.
+// kInternal: another exception. Never throws.
 Error FailureOf(std::string_view name, const std::exception& thrown);
 // kOverloaded: the job of the work `name` was dropped for others. Never throws.
 Error DroppedJobError(std::string_view name);
 
-// Runs the work and returns its result; an exception counts as kUnavailable. Never throws, which would end the program.
+// Runs the work and returns its result; an exception counts as FailureOf says. Never throws, which would end the
+// program.
 template <typename T>
 Result<T> RunWork(std::string_view name, const Work<T>& work, std::stop_token stop) {
   try {
@@ -75,7 +77,7 @@ class WorkerPool {
   asio::awaitable<Result<T>> Run(Work<T> work, JobTerms terms);
 
   // On an error the job does not run. kOverloaded: it cannot start before its deadline, or the queue is full.
-  // kUnavailable: the pool accepts no more jobs. May call another job's `on_dropped`.
+  // kCancelled: its deadline has passed, or the pool accepts no more jobs. May call another job's `on_dropped`.
   Result<void> Submit(PoolJobPtr job);
 
   // Removes a job that still waits; it never runs. Null: does nothing.

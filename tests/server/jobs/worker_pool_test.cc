@@ -15,6 +15,7 @@
 #include <latch>
 #include <memory>
 #include <new>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -140,7 +141,7 @@ TEST(WorkerPool, RunsWhatItTookAndTakesNothingAfterShutdown) {
   for (int i = 0; i < 50; ++i) ASSERT_TRUE(pool.Submit(JobOf([&] { ++done; }, {1, 0, i % 2 == 0})));
   pool.Shutdown();
   EXPECT_EQ(done, 50);
-  EXPECT_EQ(pool.Submit(JobOf([&] { ++done; })).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(pool.Submit(JobOf([&] { ++done; })).error().code, ErrorCode::kCancelled) << "no source is unreadable";
 }
 
 // The result of Run in a coroutine on a separate thread; `leave` cancels the wait.
@@ -166,11 +167,16 @@ TEST(WorkerPool, RunBringsTheWorksOwnResult) {
   EXPECT_EQ(pool.runs(), 0u);
 }
 
-TEST(WorkerPool, RunTurnsExceptionsIntoUnavailable) {
+// kUnavailable would be a source that cannot be read.
+TEST(WorkerPool, RunTellsAShortageOfMemoryFromOtherExceptions) {
   WorkerPool pool(1, 100);
-  const auto failed = RunAside<int>(pool, [](std::stop_token) -> Result<int> { throw std::bad_alloc(); }).get();
-  EXPECT_EQ(failed.error().code, ErrorCode::kUnavailable);
-  EXPECT_EQ(failed.error().message, "work for one request: std::bad_alloc");
+  const auto short_of = RunAside<int>(pool, [](std::stop_token) -> Result<int> { throw std::bad_alloc(); }).get();
+  EXPECT_EQ(short_of.error().code, ErrorCode::kOverloaded);
+  EXPECT_EQ(short_of.error().message, "work for one request: no memory");
+  const auto failed =
+      RunAside<int>(pool, [](std::stop_token) -> Result<int> { throw std::out_of_range("index 7"); }).get();
+  EXPECT_EQ(failed.error().code, ErrorCode::kInternal);
+  EXPECT_EQ(failed.error().message, "work for one request: index 7");
 }
 
 // Waits until it is asked to stop, at most ten seconds.
@@ -240,7 +246,7 @@ TEST(WorkerPool, CancelStopsWhatRunsAndRefusesWhatComes) {
   EXPECT_TRUE(stopped.get_future().get());
   running.wait();
   const auto late = RunAside<int>(pool, [](std::stop_token) -> Result<int> { return 1; }).get();
-  EXPECT_EQ(late.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(late.error().code, ErrorCode::kCancelled);
 }
 
 TEST(WorkerPool, RunTellsWhomTheQueueDisplaces) {

@@ -116,11 +116,11 @@ TEST(TileService, KeepsNoFailure) {
   EXPECT_TRUE(Get(service, catalog));
 }
 
-TEST(TileService, TurnsExceptionsIntoUnavailable) {
+TEST(TileService, AShortageOfMemoryIsNoFaultOfTheSource) {
   TestService service;
   const CatalogPtr catalog = CatalogOf(
       [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> { throw std::bad_alloc(); });
-  EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kOverloaded);
 }
 
 TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
