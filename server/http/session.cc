@@ -39,6 +39,7 @@ constexpr int kClientLeft = 499;
 
 // Checked before a body is read: nothing if it may be sent.
 std::optional<Response> RefuseBody(const Request& request, const Admission& admission) {
+  if (request.content_length == 0) return std::nullopt;
   if (request.content_length > admission.max_body_bytes) {
     return ProblemResponse(
         413,

@@ -156,6 +156,7 @@ std::vector<Rule> Bodies() {
        kCloses},
       {"a body in a coding", PostOf("Content-Encoding: gzip\r\n", kBody), {415}, kCloses},
       {"a body in the coding that is none", PostOf("Content-Encoding: identity\r\n", kBody), {200}},
+      {"a coding of no body", With("Content-Encoding: gzip\r\n") + next, {200, 200}},
       {"a body of another type",
        "POST /maui/heights HTTP/1.1\r\nHost: x\r\nContent-Type: text/plain\r\nContent-Length: 2\r\n\r\nhi",
        {415}},
