@@ -110,6 +110,7 @@ class AdminApplication::Handler final : public ConnectionHandler {
     ReplyRecord record = RecordOf(reply);
     record.route = "admin";
     record.cache = "-";
+    record.error = "";  // of a cache: no source was read
     parts_.metrics.CountReply(record);
     parts_.access_log.Write(record);
   }

@@ -116,6 +116,7 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   Response response = ProblemResponse(status, FixedDetail(code), request_id);
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
   response.try_again = code == ErrorCode::kChanged;
+  response.labels.error = ToString(code);
   return response;
 }
 

@@ -50,7 +50,8 @@ struct Response {
   struct Labels {
     std::string_view route = "none";  // literals
     std::string_view cache = "-";
-    std::string subject;  // the dataset of the request; empty: none
+    std::string_view error;  // the kind of the failure behind the reply (ToString of its ErrorCode); empty: none
+    std::string subject;     // the dataset of the request; empty: none
   } labels;
 };
 

@@ -169,7 +169,7 @@ struct Metrics::Families {
   prometheus::Counter& replayed = refinements.Add({{"use", "replayed"}});
   prometheus::Counter& source_errors = prometheus::BuildCounter()
                                            .Name("terrace_source_read_errors_total")
-                                           .Help("Builds that failed because a source could not be read")
+                                           .Help("Replies that failed because a source could not be read")
                                            .Register(registry)
                                            .Add({});
   // The counters of a reply, cached by labels: looking up a family takes as long as answering from the cache. Route and
@@ -242,6 +242,7 @@ Metrics::Metrics() : families_(std::make_unique<Families>()) {}
 Metrics::~Metrics() = default;
 
 void Metrics::CountReply(const ReplyRecord& record) {
+  if (record.error == ToString(ErrorCode::kUnavailable)) families_->source_errors.Increment();
   const auto count = [&](const Families::Reply& reply) {
     reply.count.Increment();
     reply.duration.Observe(InSeconds(record.duration));
@@ -260,10 +261,7 @@ void Metrics::CountReply(const ReplyRecord& record) {
 void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
   const std::string_view result = tile ? "ok" : ToString(tile.error().code);
   families_->CountBuild(dataset.name, result);
-  if (!tile) {
-    if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
-    return;
-  }
+  if (!tile) return;
   switch ((*tile)->refinement_use) {
     case tiler::RefinementUse::kMade:
       families_->made.Increment();

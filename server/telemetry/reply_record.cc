@@ -16,6 +16,7 @@ ReplyRecord RecordOf(const SentReply& reply) {
   record.route = response.labels.route;
   record.dataset = response.labels.subject;
   record.cache = response.labels.cache;
+  record.error = response.labels.error;
   record.version = request.version;
   record.referer = request.fields->referer;
   record.user_agent = request.fields->user_agent;

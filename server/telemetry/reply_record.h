@@ -21,6 +21,7 @@ struct ReplyRecord {
   std::string_view dataset;               // an existing dataset, or empty
   // Where the tile was: hit, miss, join, the name of the tier that had it (tiler::StoreBase::name), or -.
   std::string_view cache;
+  std::string_view error;  // the kind of the failure behind the reply (ToString of its ErrorCode); empty: none
   std::string_view request_id;
   std::string_view peer;                 // address and port
   std::string_view client;               // the client that a trusted proxy reports; empty if the peer is the client

@@ -277,6 +277,22 @@ TEST_F(HeightsTest, RequestsAreNotJoinedButBounded) {
   EXPECT_GE(refused, 1);
 }
 
+TEST_F(HeightsTest, FailuresOfSourcesAreCountedWhateverIsAsked) {
+  builder_ = [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    return MakeError(ErrorCode::kUnavailable, "the disk is gone");
+  };
+  read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition>, dem::HeightDatum,
+                    std::stop_token) -> Result<std::vector<float>> {
+    return MakeError(ErrorCode::kUnavailable, "the disk is gone");
+  };
+  Start();
+  for (const char* target : {"/maui/heights?locations=5,7", "/maui/0/0/0.terrain"}) {
+    EXPECT_EQ(Fetch(port(), target).status, 503) << target;
+  }
+  EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);
+  EXPECT_NE(Fetch(port(), "/metrics").body.find("\nterrace_source_read_errors_total 2\n"), std::string::npos);
+}
+
 TEST_F(HeightsTest, IsUnavailableWithoutAReader) {
   Start();
   EXPECT_EQ(Fetch(port(), "/maui/heights?locations=5,7").status, 503);
