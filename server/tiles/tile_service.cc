@@ -45,6 +45,7 @@ std::optional<ServedTile> TileService::Find(const Catalog& catalog, const tiler:
 asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler::TileRequest request,
                                                        JobClock::time_point deadline, std::uint64_t client) {
   using Flights = decltype(flights_);
+  misses_.fetch_add(1, std::memory_order_relaxed);
   const tiler::CacheKey key = KeyOf(*catalog, request);
   Flights::BuildWork find_or_build = [this, catalog = std::move(catalog), request, key,
                                       requested_at = JobClock::now()](const std::stop_token& stop) {
@@ -70,7 +71,6 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   // The flight may be one of the catalog before, whose files were replaced by equal ones: they have the same key.
   const bool is_of_replaced = flight.joined && !flight.value && flight.value.error().code == ErrorCode::kChanged;
   if (is_of_replaced) flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), terms);
-  if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!flight.value) {
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
     co_return tl::unexpected(std::move(flight.value.error()));

@@ -49,10 +49,10 @@ class TileService {
   // Returns the tile if it is in the cache, and counts a hit. May be called on any thread.
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
-  // For tiles that Find has not found: joins a flight, or starts one, which looks in the stores and builds the tile if
-  // none has it. Errors: those of TilePipeline::Build, and
-  // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
-  // single thread. `client`: of JobTerms (fair_queue.h). Precondition: the request names one of the datasets.
+  // For tiles that Find has not found: counts a miss, and joins a flight or starts one, which looks in the stores and
+  // builds the tile if none has it. Errors: those of TilePipeline::Build, and kOverloaded, kCancelled, kUnavailable of
+  // SingleFlight::Join. Errors are not cached. The coroutine must run on a single thread. `client`: of JobTerms
+  // (fair_queue.h). Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request,
                                             JobClock::time_point deadline, std::uint64_t client = 0);
 
@@ -70,7 +70,7 @@ class TileService {
 
   struct Stats {
     std::uint64_t hits = 0;                              // found in memory
-    std::uint64_t misses = 0;                            // calls of Build that started a flight
+    std::uint64_t misses = 0;                            // calls of Build, which may join a flight
     std::uint64_t joined = 0;                            // waited for the same work as another request
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times

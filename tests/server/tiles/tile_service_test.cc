@@ -11,6 +11,7 @@
 #include <thread>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "tests/server/fake_pipeline.h"
 
@@ -64,6 +65,27 @@ TEST(TileService, BuildsOnceAndThenFindsWhatIsCached) {
   EXPECT_EQ(builds, 1);
   EXPECT_EQ(service.tiles.stats().hits, 2u);
   EXPECT_EQ(service.tiles.stats().misses, 1u);
+}
+
+// Each has looked in memory in vain: hits and misses together are all requests.
+TEST(TileService, CountsAMissForEachRequestThatWaitsForABuild) {
+  TestService service;
+  std::promise<void> all_wait;
+  const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
+    all_wait.get_future().wait();
+    return tiler::EncodedTile();
+  });
+  asio::io_context io(1);
+  const auto deadline = JobClock::now() + std::chrono::seconds(10);
+  std::vector<std::future<Result<ServedTile>>> waiting;
+  for (int i = 0; i < 3; ++i) {
+    waiting.push_back(asio::co_spawn(io, service.tiles.Build(catalog, {}, deadline), asio::use_future));
+  }
+  while (service.tiles.stats().joined < 2) io.run_one();
+  all_wait.set_value();
+  io.run();
+  for (auto& tile : waiting) EXPECT_TRUE(tile.get());
+  EXPECT_EQ(service.tiles.stats().misses, 3u);
 }
 
 // A tier in memory.
