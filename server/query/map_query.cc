@@ -39,17 +39,15 @@ Result<void> SetAltitude(std::string_view text, MapTileParameters& parameters) {
   return {};
 }
 
-// A number with at most two decimals that count, as hundredths; nothing outside `min` .. `max` hundredths.
+// A number rounded to hundredths, of which it returns how many; nothing if the number is outside `min` .. `max`.
 std::optional<std::uint32_t> Hundredths(std::string_view text, double min, double max) {
   const std::optional<double> number = PositiveNumber(text);
-  if (!number || !(*number <= max)) return std::nullopt;
-  const double hundredths = std::floor(*number * 100 + 0.5);
-  if (hundredths < min || hundredths > max) return std::nullopt;
-  return static_cast<std::uint32_t>(hundredths);
+  if (!number || !(*number >= min && *number <= max)) return std::nullopt;
+  return static_cast<std::uint32_t>(std::floor(*number * 100 + 0.5));
 }
 
 Result<void> SetZFactor(std::string_view text, MapTileParameters& parameters) {
-  const auto hundredths = Hundredths(text, 1, 10'000);
+  const auto hundredths = Hundredths(text, 0.01, 100);
   if (!hundredths) return MakeError(ErrorCode::kInvalidArgument, "zfactor must be a number from 0.01 to 100");
   parameters.map.z_factor_hundredths = static_cast<std::uint16_t>(*hundredths);
   return {};
@@ -61,7 +59,7 @@ Result<void> SetStyle(std::string_view text, MapTileParameters& parameters) {
 }
 
 Result<void> SetInterval(std::string_view text, MapTileParameters& parameters) {
-  const auto cm = Hundredths(text, 10, tiler::kMaxIntervalCm);
+  const auto cm = Hundredths(text, 0.1, tiler::kMaxIntervalCm / 100.0);
   if (!cm) return MakeError(ErrorCode::kInvalidArgument, "interval must be a number of metres from 0.1 to 10000");
   parameters.map.interval_cm = *cm;
   return {};

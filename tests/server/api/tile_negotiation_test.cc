@@ -234,11 +234,14 @@ TEST(NegotiateTile, MapTilesAreCanonical) {
   EXPECT_EQ(find("/maui/contours/12/1/1.mvt")->coding, tiler::Coding::kGzip);
   EXPECT_EQ(find("/maui/hillshade/3/1/1.png")->coding, tiler::Coding::kIdentity);
   EXPECT_EQ(find("/maui/contours/12/1/1.mvt?interval=2.5")->map.interval_cm, 250u);
+  EXPECT_EQ(find("/maui/hillshade/3/1/1.png?zfactor=0.01")->map.z_factor_hundredths, 1u);
+  EXPECT_EQ(find("/maui/hillshade/3/1/1.png?zfactor=100")->map.z_factor_hundredths, 10'000u);
   for (const char* wrong :
        {"/maui/contours/12/1/1.mvt?interval=2.4", "/maui/contours/12/1/1.mvt?interval=0.04",
         "/maui/contours/12/1/1.mvt?interval=10001", "/maui/contours/12/1/1.mvt?interval=nan",
         "/maui/contours/12/1/1.mvt?size=512", "/maui/hillshade/3/1/1.png?azimuth=-1",
         "/maui/hillshade/3/1/1.png?azimuth=1.5", "/maui/hillshade/3/1/1.png?zfactor=0.004",
+        "/maui/hillshade/3/1/1.png?zfactor=0.0099", "/maui/hillshade/3/1/1.png?zfactor=100.001",
         "/maui/hillshade/3/1/1.png?zfactor=1e300", "/maui/hillshade/3/1/1.png?format=png",
         "/maui/slope/3/1/1.png?style=degrees&style=degrees", "/photo/imagery/0/0/0.jpg?quality=9"}) {
     const auto tile = find(wrong);
