@@ -143,7 +143,11 @@ RateLimiter::Turn AdmissionControl::TakeTurn(const RequestContext& context, cons
 }
 
 Response AdmissionControl::TooManyRequests(const RateLimiter::Turn& turn, const RequestContext& context) {
-  Response response = ProblemResponse(429, "too many requests", context.request->id);
+  Response response = ProblemResponse(
+      429,
+      "more requests than requests_per_second of this server or token allows; send fewer, and this one again after "
+      "the seconds in Retry-After",
+      context.request->id);
   const std::int64_t seconds = (turn.wait.count() + 999) / 1000;
   response.headers.emplace_back("Retry-After", fmt::to_string(std::max<std::int64_t>(seconds, 1)));
   return response;

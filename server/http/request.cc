@@ -262,7 +262,11 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   parser.body_limit(boost::none);  // FramingProblem decides
   boost::system::error_code error;
   parser.put(asio::buffer(head.data(), head.size()), error);
-  if (!parser.is_header_done()) return Bad(400, "malformed request");
+  if (!parser.is_header_done()) {
+    return Bad(400,
+               "malformed request; usual causes: a blank in the target (write %20), a header line without a colon or "
+               "with a control character, another version than HTTP/1.0 and 1.1");
+  }
 
   const Fields& fields = parser.get();
   if (fields.target().size() > kMaxTargetBytes) return Bad(414, kLongTarget);

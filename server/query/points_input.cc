@@ -30,6 +30,10 @@ Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, Pa
   std::size_t at = 0;
   Result<void> read = ReadForm(PartsOf(input.query, stop), PlusSign::kIsPlus, parameters, at);
   if (!read || input.content_type.empty() || IsBinaryBody(input.content_type)) return read;
+  if (input.body.empty() && IsJson(input.content_type)) {
+    return MakeError(ErrorCode::kInvalidArgument, "the body is empty; send a JSON object, such as {}",
+                     parameters.JsonExample());
+  }
   const TextParts parts = PartsOf(input.body, stop);
   read = IsForm(input.content_type) ? ReadForm(parts, PlusSign::kIsBlank, parameters, at)
                                     : ReadJsonObject(parts, parameters, at);

@@ -205,6 +205,7 @@ TEST_F(Limits, RefusesWhoAsksTooOftenToWait) {
   const auto refused = client.Read();
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->status, 429);
+  EXPECT_NE(refused->body.find("requests_per_second"), std::string::npos) << refused->body;
   EXPECT_EQ(refused->Field("retry-after"), "2");
   EXPECT_EQ(refused->Field("content-type"), "application/problem+json");
   EXPECT_EQ(Fetch(port(), "/maui/layer.json").status, 429) << "another connection is the same client";

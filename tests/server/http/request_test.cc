@@ -169,6 +169,12 @@ TEST(Request, RefusesAmbiguousHeads) {
   }
 }
 
+TEST(Request, NamesUsualCausesWhereItCannotBeRead) {
+  const auto request = ParseHead("GET /a b HTTP/1.1\r\nHost: x\r\n\r\n");
+  ASSERT_FALSE(request);
+  EXPECT_NE(request.error().detail.find("%20"), std::string_view::npos) << request.error().detail;
+}
+
 TEST(Request, ReadsTheBearersToken) {
   EXPECT_EQ(ParseHead(Get("Authorization: bearer  s \r\n"))->fields->bearer, "s");
   const auto basic = ParseHead(Get("Authorization: Basic abc\r\n"));

@@ -190,7 +190,7 @@ TEST(HeightsQuery, NamesTheByteWhereABodyIsWrong) {
     const char* body;
     const char* says;
   } cases[] = {
-      {kJson, "", "byte 0: this is no valid JSON"},
+      {kJson, "", R"(the body is empty; send a JSON object, such as {"locations": ")"},
       {kJson, "{", "byte 1: this is no valid JSON"},
       {kJson, "NaN", "byte 0: this is no valid JSON"},
       {kJson, "{\"locations\": \"\xff\"}", "this is no valid JSON"},
