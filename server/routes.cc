@@ -324,7 +324,6 @@ std::vector<DocumentedUrl> DocumentedUrls() {
                       .operation = row.operation,
                       .takes_post = row.takes_post(),
                       .takes_any_query = row.takes_any_query,
-                      .is_probe = row.is_probe,
                       .needs_grant = row.scope != DatasetScope::kNothing};
     if (row.pattern.ends_with(kMore)) url.pattern.resize(url.pattern.size() - kMore.size());
     if (!row.pattern.ends_with(kSuffix)) {

@@ -38,23 +38,22 @@ constexpr std::string_view kImageTileJson =
 
 Operation MapTile(std::string_view id, std::string_view summary, std::string_view description,
                   std::vector<ParameterNote> parameters, std::vector<MediaNote> replies,
-                  std::vector<ExampleRequest> examples) {
+                  std::vector<ExampleRequest> examples,
+                  std::vector<std::string_view> headers = {"ETag", "Cache-Control"}) {
   return {.id = id,
           .tag = "maps",
           .summary = summary,
           .description = description,
           .parameters = std::move(parameters),
           .replies = std::move(replies),
-          .headers = {"ETag", "Cache-Control"},
+          .headers = std::move(headers),
           .examples = std::move(examples)};
 }
 
 Operation MapTileJson(std::string_view id, std::string_view summary, std::string_view description,
                       std::vector<ParameterNote> parameters, std::vector<ExampleRequest> examples) {
-  Operation operation = MapTile(id, summary, description, std::move(parameters), {{"application/json", "MapTileJson"}},
-                                std::move(examples));
-  operation.headers = DocumentHeaders();
-  return operation;
+  return MapTile(id, summary, description, std::move(parameters), {{"application/json", "MapTileJson"}},
+                 std::move(examples), DocumentHeaders());
 }
 
 }  // namespace
@@ -83,10 +82,10 @@ const Operation kSlopeTileJsonOperation =
     MapTileJson("getSlopeTileJson", "TileJSON 3.0 of the layer slope", kTileJson, {kSizeNote, kStyleNote, kPictureNote},
                 {{"/jacksboro/slope/tiles.json"}, {"/jacksboro/slope/tiles.json?style=degrees&size=512&format=webp"}});
 
-const Operation kContoursOperation =
-    MapTile("getContours", "Contour lines as a Mapbox Vector Tile", kMercatorTile, kContoursParameters,
-            {{"application/vnd.mapbox-vector-tile"}},
-            {{"/jacksboro/contours/9/135/200.mvt"}, {"/jacksboro/contours/9/135/200.mvt?interval=50"}});
+const Operation kContoursOperation = MapTile(
+    "getContours", "Contour lines as a Mapbox Vector Tile", kMercatorTile, kContoursParameters,
+    {{"application/vnd.mapbox-vector-tile"}},
+    {{"/jacksboro/contours/9/135/200.mvt"}, {"/jacksboro/contours/9/135/200.mvt?interval=50"}}, DocumentHeaders());
 const Operation kContoursTileJsonOperation =
     MapTileJson("getContoursTileJson", "TileJSON 3.0 of the layer contours", kTileJson, kContoursParameters,
                 {{"/jacksboro/contours/tiles.json"}, {"/jacksboro/contours/tiles.json?interval=50"}});

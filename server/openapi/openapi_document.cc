@@ -29,7 +29,6 @@ struct StatusNote {
 constexpr bool Always(const DocumentedUrl&, bool) { return true; }
 constexpr bool IfPost(const DocumentedUrl&, bool is_post) { return is_post; }
 constexpr bool IfGranted(const DocumentedUrl& url, bool) { return url.needs_grant; }
-constexpr bool IfLimited(const DocumentedUrl& url, bool) { return !url.is_probe; }
 bool IfNamed(const DocumentedUrl& url, bool) { return url.pattern.find('{') != std::string::npos; }
 bool IfTagged(const DocumentedUrl& url, bool is_post) {
   return !is_post && url.operation != nullptr && std::ranges::count(url.operation->headers, "ETag") > 0;
@@ -46,8 +45,7 @@ constexpr StatusNote kStatuses[] = {
     {413, "ContentTooLarge", "The body exceeds the limit that follows from `max_locations`", "", IfPost},
     {414, "UriTooLong", "The request target is over 8 KiB", "", Always},
     {415, "UnsupportedMediaType", "The body has a `Content-Encoding`, or another type than those listed", "", IfPost},
-    {429, "TooManyRequests", "More requests or connections than the server allows the client", "Retry-After",
-     IfLimited},
+    {429, "TooManyRequests", "More requests or connections than the server allows the client", "Retry-After", Always},
     {431, "HeaderTooLarge", "The request head is over 16 KiB", "", Always},
     {503, "Unavailable", "Overload, a source that cannot be read, a start or a stop; the request may be repeated",
      "Retry-After", Always},
@@ -117,9 +115,10 @@ Json ParametersOf(const DocumentedUrl& url) {
   return parameters;
 }
 
-Json ContentOf(std::span<const MediaNote> media) {
+Json ContentOf(std::span<const MediaNote> media, bool is_post) {
   Json content = Json::object();
   for (const MediaNote& note : media) {
+    if (note.is_of_post && !is_post) continue;
     content[std::string(note.type)] = Json::object();
     if (!note.schema.empty()) content[std::string(note.type)]["schema"] = RefTo("schemas", note.schema);
   }
@@ -134,7 +133,7 @@ Json RepliesOf(const DocumentedUrl& url, bool is_post) {
       // What a POST returns is not cached and has no ETag.
       if (!(is_post && header == "ETag")) success["headers"][std::string(header)] = RefTo("headers", header);
     }
-    success["content"] = ContentOf(url.operation->replies);
+    success["content"] = ContentOf(url.operation->replies, is_post);
   }
   for (const StatusNote& note : kStatuses) {
     if (!note.applies(url, is_post)) continue;
@@ -142,18 +141,32 @@ Json RepliesOf(const DocumentedUrl& url, bool is_post) {
     reply = RefTo("responses", note.name);
     if (note.status != 503 || url.operation == nullptr || url.operation->unavailable.empty()) continue;
     reply = {{"description", note.when}, {"headers", {{"Retry-After", RefTo("headers", "Retry-After")}}}};
-    reply["content"] = ContentOf(url.operation->unavailable);
+    reply["content"] = ContentOf(url.operation->unavailable, is_post);
     reply["content"]["application/problem+json"]["schema"] = RefTo("schemas", "Problem");
   }
   return replies;
 }
 
+// A member of a body. Numbers may be sent as texts, and texts as numbers.
+Json MemberOf(const ParameterNote& note) {
+  Json schema = Parsed(note.schema);
+  const std::string type = schema.at("type");
+  schema["type"] = Json::array({type, type == "string" ? "number" : "string"});
+  const Json words = schema.value("enum", Json::array());
+  for (const Json& word : words) {
+    const Json number = word.is_string() ? Json::parse(word.get<std::string>(), nullptr, /*allow_exceptions=*/false)
+                                         : Json(word.dump());
+    if (number.is_number() || number.is_string()) schema["enum"].push_back(number);
+  }
+  schema["description"] = note.meaning;
+  return schema;
+}
+
 // Bodies have the parameters of the query.
 Json BodyOf(const Operation& operation) {
   Json object = {{"type", "object"}, {"additionalProperties", false}};
-  for (const ParameterNote& note : operation.parameters) {
-    object["properties"][std::string(note.name)] = {{"type", {"string", "number"}}, {"description", note.meaning}};
-  }
+  for (const ParameterNote& note : operation.parameters) object["properties"][std::string(note.name)] = MemberOf(note);
+  object["properties"]["v"] = {{"type", Json::array({"string", "number"})}, {"description", "As in the query"}};
   Json content = Json::object();
   for (const ExampleRequest& example : operation.examples) {
     if (example.body_type.empty()) continue;
@@ -277,8 +290,10 @@ std::string WriteOpenApi(const std::vector<DocumentedUrl>& urls) {
       {"summary", "Level-of-detail terrain tiles over HTTP"},
       {"description",
        "Elevation rasters as quantized-mesh, 3D Tiles, height images, heights and meshes. Each URL also "
-       "answers HEAD and OPTIONS. Each query parameter may occur once unless stated otherwise; unknown "
-       "ones get 400. `x-examples` has requests that a server of the sample data answers with 200."},
+       "answers HEAD and OPTIONS. Each query parameter may occur once unless stated otherwise; URLs that end in "
+       "`.glb`, `.subtree` and `tileset.json` accept `error`, `fraction`, `compression` and `texture` repeatedly with "
+       "one value, because clients append the parameters of `tileset.json` to the URLs below it. Unknown parameters "
+       "get 400. `x-examples` has requests that a server of the sample data answers with 200."},
       {"contact", {{"name", "The terrace authors"}}},
       {"license", {{"name", "Apache-2.0"}, {"identifier", "Apache-2.0"}}}};
   document["servers"] = Json::array({{{"url", "/"}, {"description", "The server that sent this document"}}});

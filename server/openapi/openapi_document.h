@@ -17,7 +17,6 @@ struct DocumentedUrl {
   const Operation* operation = nullptr;  // null: only its pattern is known
   bool takes_post = false;
   bool takes_any_query = false;
-  bool is_probe = false;     // exempt from rate limits
   bool needs_grant = false;  // the reply depends on a token, where the server has tokens
 };
 

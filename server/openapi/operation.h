@@ -20,6 +20,7 @@ struct ParameterNote {
 struct MediaNote {
   std::string_view type;         // "application/json"
   std::string_view schema = {};  // name of a row of kSchemas; empty: bytes
+  bool is_of_post = false;       // a GET does not return it
 };
 
 // A request that gets 200 from a server of config/samples. A test sends each one.

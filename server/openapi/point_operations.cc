@@ -34,7 +34,7 @@ const Operation kHeightsOperation{
                    kAtLeastNote,
                    kSurfaceFormatNote,
                    kCompressionNote},
-    .replies = {{"application/json", "Heights"}, {"application/octet-stream"}},
+    .replies = {{"application/json", "Heights"}, {.type = "application/octet-stream", .is_of_post = true}},
     .headers = DocumentHeaders(),
     .examples = {{"/jacksboro/heights?locations=36.3,-84.2|0,0"},
                  {"/jacksboro/heights?locations=36.3,-84.2&datum=ellipsoid&normals=1"},
@@ -119,7 +119,7 @@ const Operation kSightOperation{
                    kAtLeastNote,
                    kSurfaceFormatNote,
                    kCompressionNote},
-    .replies = {{"application/json", "Sight"}, {"application/octet-stream"}},
+    .replies = {{"application/json", "Sight"}, {.type = "application/octet-stream", .is_of_post = true}},
     .headers = DocumentHeaders(),
     .examples = {
         {"/jacksboro/sight?from=36.3,-84.2,10&to=36.31,-84.21,10&heights=ground&refraction=0.13"},

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <boost/json/basic_parser_impl.hpp>
 #include <boost/json/src.hpp>  // the library's implementation, compiled here
 #include <boost/system/errc.hpp>
@@ -41,10 +42,10 @@ class ObjectHandler {
   }
   bool on_string_part(boost::json::string_view part, std::size_t, error_code& error) { return Add(part, error); }
   bool on_string(boost::json::string_view part, std::size_t, error_code& error) { return End(part, error); }
-  bool on_number_part(boost::json::string_view part, error_code& error) { return Add(part, error); }
-  bool on_int64(std::int64_t, boost::json::string_view part, error_code& error) { return End(part, error); }
-  bool on_uint64(std::uint64_t, boost::json::string_view part, error_code& error) { return End(part, error); }
-  bool on_double(double, boost::json::string_view part, error_code& error) { return End(part, error); }
+  bool on_number_part(boost::json::string_view part, error_code& error) { return AddNumber(part, error); }
+  bool on_int64(std::int64_t, boost::json::string_view part, error_code& error) { return EndNumber(part, error); }
+  bool on_uint64(std::uint64_t, boost::json::string_view part, error_code& error) { return EndNumber(part, error); }
+  bool on_double(double, boost::json::string_view part, error_code& error) { return EndNumber(part, error); }
   bool on_bool(bool, error_code& error) { return RefuseValue(error); }
   bool on_null(error_code& error) { return RefuseValue(error); }
   bool on_comment_part(boost::json::string_view, error_code&) { return true; }
@@ -71,8 +72,35 @@ class ObjectHandler {
     return Add(part, error) && Take(sink_.EndValue(), error);
   }
 
+  // 3.0 is the number 3, and some programs write it so: a fraction of zeros alone is left out.
+  bool AddNumber(boost::json::string_view part, error_code& error) {
+    if (held_ == 0) {
+      const std::size_t point = std::min(part.find('.'), part.size());
+      if (!Add(part.substr(0, point), error)) return false;
+      part.remove_prefix(point);
+      if (part.empty()) return true;
+      part.remove_prefix(1);
+      held_ = 1;
+    }
+    const std::size_t zeros = std::min(part.find_first_not_of('0'), part.size());
+    held_ += zeros;
+    part.remove_prefix(zeros);
+    if (part.empty()) return true;
+    if (!Add(".", error)) return false;
+    while (--held_ > 0) {
+      if (!Add("0", error)) return false;
+    }
+    return Add(part, error);  // a number has no second point
+  }
+  bool EndNumber(boost::json::string_view part, error_code& error) {
+    if (!AddNumber(part, error)) return false;
+    held_ = 0;
+    return End("", error);
+  }
+
   ParameterSink& sink_;
   bool is_in_object_ = false;
+  std::size_t held_ = 0;  // the point and the zeros after it that were not added; 0: there was no point
   Result<void> result_;
 };
 

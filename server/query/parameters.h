@@ -41,8 +41,8 @@ enum class PlusSign { kIsPlus, kIsBlank };
 // contains '%': no name here needs it, and proxies would not recognize the parameter. `at`: the number of bytes parsed.
 Result<void> ReadForm(const TextParts& next, PlusSign plus, ParameterSink& sink, std::size_t& at);
 
-// Parses a JSON object (RFC 8259) of texts and numbers; numbers are passed on as text. Skips a byte order mark.
-// kInvalidArgument: the text is something else; parsing ends at the first wrong byte. `at`: as above.
+// Parses a JSON object (RFC 8259) of texts and numbers; numbers are passed on as text, 3.0 as "3". Skips a byte order
+// mark. kInvalidArgument: the text is something else; parsing ends at the first wrong byte. `at`: as above.
 Result<void> ReadJsonObject(const TextParts& next, ParameterSink& sink, std::size_t& at);
 
 }  // namespace terrace::server

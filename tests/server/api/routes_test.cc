@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -255,6 +256,57 @@ std::string Encoded(std::string_view target) {
     }
   }
   return encoded;
+}
+
+class OpenApi : public testing::Test {
+ protected:
+  // The operation of an id.
+  const nlohmann::json& Of(std::string_view id) const {
+    for (const auto& path : document_["paths"]) {
+      for (const auto& operation : path) {
+        if (operation["operationId"] == id) return operation;
+      }
+    }
+    ADD_FAILURE() << id;
+    return document_;
+  }
+
+  const nlohmann::json document_ = nlohmann::json::parse(WriteOpenApi(DocumentedUrls()));
+};
+
+TEST_F(OpenApi, BodiesHaveTheTypesOfTheQueryAndItsVersion) {
+  const auto& content = Of("getHeightsByPost")["requestBody"]["content"];
+  const auto& members = content["application/json"]["schema"]["properties"];
+  EXPECT_EQ(members["samples"]["type"], nlohmann::json::parse(R"(["integer","string"])"));
+  EXPECT_EQ(members["samples"]["minimum"], 2);
+  EXPECT_EQ(members["normals"]["enum"], nlohmann::json::parse(R"(["0","1",0,1])"));
+  EXPECT_EQ(members["surface"]["enum"], nlohmann::json::parse(R"(["source","served"])"));
+  EXPECT_TRUE(members.contains("v"));
+}
+
+TEST_F(OpenApi, NumbersAreRepliesToNumbersAlone) {
+  for (const std::string id : {"getHeights", "getSight"}) {
+    EXPECT_FALSE(Of(id)["responses"]["200"]["content"].contains("application/octet-stream")) << id;
+    EXPECT_TRUE(Of(id + "ByPost")["responses"]["200"]["content"].contains("application/octet-stream")) << id;
+  }
+  EXPECT_TRUE(Of("getGrid")["responses"]["200"]["content"].contains("application/octet-stream"));
+}
+
+TEST_F(OpenApi, EveryUrlMayBeRefusedForTooManyConnections) {
+  for (const auto& [pattern, path] : document_["paths"].items()) {
+    EXPECT_TRUE(path["get"]["responses"].contains("429")) << pattern;
+  }
+}
+
+TEST_F(OpenApi, TilesThatVarySaySo) {
+  for (const TileFormatRow& row : TileFormatRows()) {
+    tiler::TileRequest tile;
+    tile.format = row.format;
+    const auto& headers = row.operation->headers;
+    if (!row.vary(tile).empty()) {
+      EXPECT_EQ(std::ranges::count(headers, "Vary"), 1) << row.operation->id;
+    }
+  }
 }
 
 // Otherwise its reply is private even with a version, and the log leaves a part of it out.

@@ -142,7 +142,7 @@ TEST(HeightsQuery, ReadsBodies) {
   ASSERT_TRUE(path) << path.error().message;
   EXPECT_EQ(path->distances_m, (std::vector<double>{0, 50'000, 100'000, 111'319.491}));
   EXPECT_EQ(path->certify_level, 3);
-  const auto samples = ParseBody(kJson, R"({"samples": 3, "path": "1,2|3,4"})");
+  const auto samples = ParseBody(kJson, R"({"samples": 3.0, "path": "1,2|3,4"})");
   ASSERT_TRUE(samples) << samples.error().message;
   EXPECT_EQ(samples->points.size(), 3u);
   const auto form = ParseBody(kForm, "locations=1%2C2%7C3%2C+4&v=1&&v=2");
@@ -158,8 +158,9 @@ TEST(HeightsQuery, ReadsBodies) {
 }
 
 TEST(HeightsQuery, ReadsPartsOfAnySize) {
-  const std::string_view json = R"({"locations": "1\u002c2|3.5,-4e1", "datum": "orthometric", "certify": 12})";
-  const std::string_view form = "locations=1%2c2%7C3.5,-4e1&datum=orthometric&certify=12";
+  const std::string_view json = R"({"locations": "1\u002c2|3.5,-4e1", "datum": "orthometric", "certify": 12.00,
+                                    "error": 10.050, "fraction": 1.0e2})";
+  const std::string_view form = "locations=1%2c2%7C3.5,-4e1&datum=orthometric&certify=12&error=10.050&fraction=1.0e2";
   for (std::size_t size = 1; size <= json.size(); ++size) {
     for (const bool is_json : {true, false}) {
       std::string_view rest = is_json ? json : form;
@@ -180,6 +181,8 @@ TEST(HeightsQuery, ReadsPartsOfAnySize) {
       EXPECT_EQ(points[1].longitude, -40);
       EXPECT_EQ(parameters.text(HeightsParameters::kDatum), "orthometric");
       EXPECT_EQ(parameters.text(HeightsParameters::kCertify), "12");
+      EXPECT_EQ(parameters.text(HeightsParameters::kError), "10.050");
+      EXPECT_EQ(parameters.text(HeightsParameters::kFraction), "1.0e2");
     }
   }
 }
