@@ -114,6 +114,7 @@ class RunningServer final : public Server {
   Result<void> Replace(CatalogPtr catalog, const config::Config& config) override {
     if (Result<void> named = CheckNames(catalog->datasets); !named) return named;
     tiles_.SetCacheBytes(config.cache_bytes);
+    tiles_.AlsoRetainTilesOf(*catalog);
     const bool is_first = application_.Replace(catalog, config);
     if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);

@@ -8,14 +8,25 @@
 
 namespace terrace::server {
 
-void BakedStore::Use(const std::vector<tiler::Dataset>& datasets) {
-  std::multimap<std::uint64_t, Archive> baked;
+std::multimap<std::uint64_t, BakedStore::Archive> BakedStore::ArchivesOf(const std::vector<tiler::Dataset>& datasets) {
+  std::multimap<std::uint64_t, Archive> archives;
   for (const tiler::Dataset& dataset : datasets) {
-    if (dataset.baked) baked.emplace(dataset.cache_generation(), Archive{dataset.baked, dataset.model});
+    if (dataset.baked) archives.emplace(dataset.cache_generation(), Archive{dataset.baked, dataset.model});
   }
+  return archives;
+}
+
+void BakedStore::Use(const std::vector<tiler::Dataset>& datasets) {
+  std::multimap<std::uint64_t, Archive> baked = ArchivesOf(datasets);  // the old ones are destroyed without the lock
   const std::unique_lock lock(mutex_);
   baked_.swap(baked);
   reported_.clear();
+}
+
+void BakedStore::AlsoUse(const std::vector<tiler::Dataset>& datasets) {
+  std::multimap<std::uint64_t, Archive> added = ArchivesOf(datasets);
+  const std::unique_lock lock(mutex_);
+  baked_.merge(added);
 }
 
 std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {

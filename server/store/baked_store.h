@@ -25,6 +25,8 @@ class BakedStore final : public tiler::TileStore {
  public:
   // Uses the archives of these datasets from now on, and no others.
   void Use(const std::vector<tiler::Dataset>& datasets);
+  // Until the next Use also uses these.
+  void AlsoUse(const std::vector<tiler::Dataset>& datasets);
 
   const char* name() const override { return "archive"; }
   tiler::StoreStats stats() const override;
@@ -37,13 +39,14 @@ class BakedStore final : public tiler::TileStore {
   void Insert(const tiler::CacheKey&, std::shared_ptr<const tiler::EncodedTile>) override {}
 
  private:
-  void Report(const std::string& fault);
-
-  mutable std::shared_mutex mutex_;
   struct Archive {
     std::shared_ptr<const tiler::BakedTiles> tiles;
     std::shared_ptr<const dem::ElevationModel> model;  // whose edits the tiles have; null: without sources
   };
+  static std::multimap<std::uint64_t, Archive> ArchivesOf(const std::vector<tiler::Dataset>& datasets);
+  void Report(const std::string& fault);
+
+  mutable std::shared_mutex mutex_;
   std::multimap<std::uint64_t, Archive> baked_;  // by Dataset::cache_generation; guarded by mutex_
   std::set<std::string> reported_;               // guarded by mutex_
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0};

@@ -28,6 +28,12 @@ tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
   return {request, dataset.cache_generation, edits};
 }
 
+std::vector<std::uint64_t> GenerationsOf(const Catalog& catalog) {
+  std::vector<std::uint64_t> generations;
+  for (const DatasetView& dataset : catalog.datasets) generations.push_back(dataset.cache_generation);
+  return generations;
+}
+
 }  // namespace
 
 TileService::TileService(WorkerPool& workers, TileServiceOptions options, BuildObserver observer)
@@ -80,14 +86,12 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
 
+void TileService::AlsoRetainTilesOf(const Catalog& catalog) { tiers_.memory().AlsoRetain(GenerationsOf(catalog)); }
+
 void TileService::RetainTilesOf(const Catalog& catalog) {
-  std::vector<std::uint64_t> generations;
   bool has_edits = false;
-  for (const DatasetView& dataset : catalog.datasets) {
-    generations.push_back(dataset.cache_generation);
-    has_edits |= static_cast<bool>(dataset.edits_hash) || had_edits_;
-  }
-  tiers_.memory().Retain(generations);
+  for (const DatasetView& dataset : catalog.datasets) has_edits |= static_cast<bool>(dataset.edits_hash) || had_edits_;
+  tiers_.memory().Retain(GenerationsOf(catalog));
   // In datasets that stay: erases the tiles whose edits have changed.
   if (has_edits) {
     tiers_.memory().EraseIf([&](const tiler::CacheKey& key) {

@@ -61,6 +61,9 @@ class TileService {
   // with the old edits.
   void RetainTilesOf(const Catalog& catalog);
 
+  // Call it before `catalog` is served: until the next RetainTilesOf its tiles are inserted, too.
+  void AlsoRetainTilesOf(const Catalog& catalog);
+
   // TileTiers::Erase.
   Result<tiler::TileTiers::Erased> Erase(const tiler::TileSelection& selection, const std::stop_token& stop = {}) {
     return tiers_.Erase(selection, stop);

@@ -98,6 +98,14 @@ class ByteCache {
     }
   }
 
+  // Until the next Retain also accepts entries of these generations.
+  void AlsoRetain(const std::vector<std::uint64_t>& generations) {
+    for (const auto& shard : shards_) {
+      const std::lock_guard lock(shard->mutex);
+      if (shard->retained) shard->retained->insert(shard->retained->end(), generations.begin(), generations.end());
+    }
+  }
+
   // Removes the entries whose keys `is_chosen` accepts, and returns the number of their values. Calls `is_chosen`
   // without a lock, because it may take long; entries that are inserted meanwhile may stay.
   template <typename Predicate>

@@ -34,8 +34,9 @@ class RefinementCache {
   };
   Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
 
-  // As ByteCache::Retain, for the memory tier.
+  // As those of ByteCache, for the memory tier.
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
+  void AlsoRetain(const std::vector<std::uint64_t>& generations) { memory_.AlsoRetain(generations); }
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
   // Of the memory tier.
   CacheStats stats() const;

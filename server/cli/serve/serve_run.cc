@@ -211,6 +211,11 @@ void ServeRun::Publish(const std::vector<tiler::Dataset>& served, const config::
   if (level_.exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
   refinements_->SetCapacity(now.refinement_cache_bytes);
   const std::vector<std::string> pending = PendingOf(now, served);
+  std::vector<std::uint64_t> generations;
+  for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
+  // The tiers know the new datasets before requests for them come, and forget the old ones afterwards.
+  baked_->AlsoUse(served);
+  refinements_->AlsoRetain(generations);
   if (const Result<void> replaced = server_->Replace(CatalogOf(served, pending), now); !replaced) {
     spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
   } else {
@@ -219,8 +224,6 @@ void ServeRun::Publish(const std::vector<tiler::Dataset>& served, const config::
   }
   has_served_nothing_ = false;
   baked_->Use(served);
-  std::vector<std::uint64_t> generations;
-  for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
   refinements_->Retain(generations);
   if (!pending.empty() || std::exchange(is_announced_, true)) return;
   AnnounceAll();

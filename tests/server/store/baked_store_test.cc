@@ -50,6 +50,8 @@ TEST(BakedStoreTest, FindsTilesOfTheGenerationThatWasBaked) {
   EXPECT_EQ(store.Find(KeyOf(7, 0))->bytes, "baked");
   EXPECT_FALSE(store.Find(KeyOf(8, 0))) << "another generation";
   EXPECT_TRUE(store.stats().on);
+  store.AlsoUse({DatasetOf(8)});
+  EXPECT_TRUE(store.Find(KeyOf(7, 0)) && store.Find(KeyOf(8, 0))) << "while one catalog replaces the other";
   store.Use({DatasetOf(8)});
   EXPECT_FALSE(store.Find(KeyOf(7, 0))) << "no longer served";
 }

@@ -179,6 +179,19 @@ TEST(TileService, ForgetsGenerationsThatAreGone) {
   EXPECT_EQ(service.tiles.stats().cache.entries, 1u) << "but not kept";
 }
 
+TEST(TileService, KeepsTheTilesOfACatalogThatIsAboutToBeServed) {
+  TestService service;
+  const auto old = CatalogOf(BuildEmpty), next = CatalogOf(BuildEmpty);
+  next->datasets[0].cache_generation = 2;
+  service.tiles.RetainTilesOf(*old);
+  service.tiles.AlsoRetainTilesOf(*next);
+  ASSERT_TRUE(Get(service, old));
+  ASSERT_TRUE(Get(service, next));
+  EXPECT_EQ(service.tiles.stats().cache.entries, 2u);
+  service.tiles.RetainTilesOf(*next);
+  EXPECT_EQ(Get(service, next)->cache, CacheStatus::kHit);
+}
+
 // Other edits are another generation, but the tiles that none of them touches have their old keys.
 TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
   TestService service;

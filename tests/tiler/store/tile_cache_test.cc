@@ -134,9 +134,12 @@ TEST(TileCache, RetainsTheGenerationsItIsToldOf) {
   cache.Insert(Key(1, 2), Tile());
   EXPECT_EQ(cache.Find(Key(1, 2)), nullptr) << "a build that lands late";
   EXPECT_EQ(cache.stats().bytes, 2 * kCharge);
-  cache.Retain({2});
+  cache.AlsoRetain({2});
   cache.Insert(Key(1, 2), Tile());
   EXPECT_NE(cache.Find(Key(1, 2)), nullptr) << "back again";
+  EXPECT_NE(cache.Find(Key(1, 1)), nullptr) << "beside the others";
+  cache.Retain({2});
+  EXPECT_NE(cache.Find(Key(1, 2)), nullptr);
   EXPECT_EQ(cache.stats().entries, 1u);
 }
 
