@@ -209,7 +209,7 @@ TEST_F(HeightsTest, ClosesSlowBodies) {
 
 TEST_F(HeightsTest, RefusedAndAbandonedBodiesAreCountedForTheirRouteAndDataset) {
   ServerOptions options;
-  options.config.header_timeout = 200ms;
+  options.config.header_timeout = 400ms;
   options.config.max_locations = 10;
   StartHeights(options);
   const auto status_of = [&](const std::string& request) {
