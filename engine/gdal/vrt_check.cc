@@ -39,8 +39,18 @@ bool IsInside(const fs::path& file, const fs::path& folder) {
   return in_folder == folder.end();
 }
 
+// GDAL reads the parts of a linked VRT beside the link's target. Links of folders are left to the file system.
+fs::path FollowLinks(fs::path file) {
+  constexpr int kMaxLinks = 40;  // as Linux
+  std::error_code ignored;
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(file, ignored); ++i) {
+    file = file.parent_path() / fs::read_symlink(file, ignored);
+  }
+  return file;
+}
+
 // Made absolute first, because a bare file name has no folder.
-fs::path FolderOf(const std::string& path, std::error_code& error) {
+fs::path FolderOf(const fs::path& path, std::error_code& error) {
   return fs::canonical(fs::absolute(path, error).parent_path(), error);
 }
 
@@ -63,7 +73,10 @@ class Checker {
  private:
   Result<void> CheckNodes(const CPLXMLNode* node, const fs::path& vrt, int depth) {
     for (; node != nullptr; node = node->psNext) {
-      if (node->eType == CXT_Attribute && EQUAL(node->pszValue, "subClass")) return Refuse(vrt, "subClass");
+      // GDAL takes an attribute for the element of that name.
+      for (const char* name : {"subClass", "SourceFilename"}) {
+        if (node->eType == CXT_Attribute && EQUAL(node->pszValue, name)) return Refuse(vrt, name);
+      }
       if (node->eType != CXT_Element) continue;
       const std::string_view name = node->pszValue;
       if (name == "?xml") continue;
@@ -86,10 +99,15 @@ class Checker {
 
   Result<void> CheckPart(const CPLXMLNode* node, const fs::path& vrt, int depth) {
     fs::path part = CPLGetXMLValue(node, "", "");
-    if (CPLTestBool(CPLGetXMLValue(node, "relativeToVRT", "0"))) part = vrt.parent_path() / part;
     const auto fail = [&](const std::string& why) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a part of it: {}", vrt.string(), why);
     };
+    // GDAL reads a number: "true" is 0.
+    const std::string_view relative = CPLGetXMLValue(node, "relativeToVRT", "0");
+    if (relative != "0" && relative != "1") {
+      return fail(fmt::format("{}: its relativeToVRT is \"{}\"; write \"1\" or \"0\"", part.string(), relative));
+    }
+    if (relative == "1") part = vrt.parent_path() / part;
     parts_.push_back(part.string());
     if (IsAllowedRemote(part.string())) {
       // OpenRaster would look into the file, but a mosaic may have thousands of parts.
@@ -124,15 +142,16 @@ bool LooksLikeVrt(const std::string& path) {
 
 Result<void> CheckVrt(const std::string& path) {
   std::error_code error;
-  const fs::path folder = FolderOf(path, error);
+  const fs::path vrt = FollowLinks(path), folder = FolderOf(vrt, error);
   if (error) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", path, error.message());
-  return Checker(folder).Check(path, 0);
+  return Checker(folder).Check(vrt, 0);
 }
 
 std::vector<std::string> PartsOfVrt(const std::string& path) {
   std::error_code error;
-  Checker checker(FolderOf(path, error));
-  static_cast<void>(checker.Check(path, 0));
+  const fs::path vrt = FollowLinks(path);
+  Checker checker(FolderOf(vrt, error));
+  static_cast<void>(checker.Check(vrt, 0));
   return checker.TakeParts();
 }
 

@@ -13,6 +13,7 @@ bool LooksLikeVrt(const std::string& path);
 
 // Accepts only plain mosaics of files: no elements that compute, warp or set options, and only files that
 // CheckSourceName allows. Without data roots, the files must lie below the VRT's folder. Remote files must be GeoTIFFs.
+// For a symbolic link its target counts, also as the place that names are relative to.
 Result<void> CheckVrt(const std::string& path);
 
 // Returns the names of all files that a VRT refers to, directly or through nested VRTs; GDAL lists only the direct

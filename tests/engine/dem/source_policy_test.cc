@@ -294,21 +294,71 @@ TEST_F(SourcePolicyTest, RefusesVrtsThatDoMoreOrLeadElsewhere) {
   const std::string options =
       Vrt("<SimpleSource><SourceFilename relativeToVRT=\"1\">dem.tif</SourceFilename><OpenOptions>"
           "<OOI key=\"GEOREF_SOURCES\">NONE</OOI></OpenOptions></SimpleSource>");
+  const std::string attribute =
+      Vrt("<SimpleSource SourceFilename=\"" + secret + "\"><SourceBand>1</SourceBand></SimpleSource>");
   const std::string group = "<VRTDataset><Group name=\"/\"><Array name=\"a\"><Source><SourceFilename>" + secret +
                             "</SourceFilename></Source></Array></Group></VRTDataset>";
   Allow({.roots = {root_.string()}, .drivers = WithVrt()});
   const OpenWatch watch(outside_);
-  for (const std::string& xml :
-       {Vrt(Part(secret)), Vrt(Part("../outside/secret.tif", true)), Vrt(Part("link.tif", true)),
-        Vrt(Part("inner.vrt", true)), Vrt(Part("loop.vrt", true)), Vrt(Part("disguised.tif", true)),
-        Vrt(Part("/vsicurl/" + web_.url("a.tif"))), Vrt(Part("/vsizip/" + secret)), Vrt(Part("vrt://" + secret)),
-        Vrt(Part("&lt;VRTDataset/&gt;")), Vrt(Part("GTIFF_DIR:1:" + secret)), Vrt("<KernelFilteredSource/>"), python,
-        raw, warped, options, group, std::string("<VRTDataset"), std::string("not XML")}) {
+  for (const std::string& xml : {Vrt(Part(secret)),
+                                 Vrt(Part("../outside/secret.tif", true)),
+                                 Vrt(Part("link.tif", true)),
+                                 Vrt(Part("inner.vrt", true)),
+                                 Vrt(Part("loop.vrt", true)),
+                                 Vrt(Part("disguised.tif", true)),
+                                 Vrt(Part("/vsicurl/" + web_.url("a.tif"))),
+                                 Vrt(Part("/vsizip/" + secret)),
+                                 Vrt(Part("vrt://" + secret)),
+                                 Vrt(Part("&lt;VRTDataset/&gt;")),
+                                 Vrt(Part("GTIFF_DIR:1:" + secret)),
+                                 Vrt("<KernelFilteredSource/>"),
+                                 python,
+                                 raw,
+                                 warped,
+                                 options,
+                                 attribute,
+                                 group,
+                                 std::string("<VRTDataset"),
+                                 std::string("not XML")}) {
     Write(root_ / "hostile.vrt", xml);
     EXPECT_FALSE(OpenRaster((root_ / "hostile.vrt").string())) << xml;
   }
   EXPECT_EQ(watch.Opened(), std::set<std::string>());
   EXPECT_EQ(web_.hits(), 0);
+}
+
+// Of relativeToVRT GDAL reads a number: the names would be relative to another folder than the one that is checked.
+TEST_F(SourcePolicyTest, WhetherAPartIsRelativeIsADigit) {
+  Allow({.roots = {root_.string()}, .drivers = WithVrt()});
+  for (const char* relative : {"true", "yes", "on", "", "2", "1x"}) {
+    Write(root_ / "mosaic.vrt", Vrt(fmt::format("<SimpleSource><SourceFilename relativeToVRT=\"{}\">dem.tif"
+                                                "</SourceFilename><SourceBand>1</SourceBand></SimpleSource>",
+                                                relative)));
+    const auto refused = OpenRaster((root_ / "mosaic.vrt").string());
+    ASSERT_FALSE(refused) << relative;
+    EXPECT_NE(refused.error().message.find("relativeToVRT"), std::string::npos) << refused.error().message;
+  }
+}
+
+TEST_F(SourcePolicyTest, OfALinkToAVrtTheTargetCounts) {
+  for (const char* folder : {"2024", "links"}) fs::create_directory(root_ / folder);
+  const std::string part = WriteRaster(dir_, {}, "root/2024/x.tif");
+  Write(root_ / "2024" / "m.vrt", Vrt(Part("x.tif", true)));
+  fs::create_symlink("2024/m.vrt", root_ / "latest.vrt");
+  fs::create_symlink("../latest.vrt", root_ / "links" / "again.vrt");
+  Write(root_ / "nested.vrt", Vrt(Part("links/again.vrt", true)));
+  for (const auto& roots : {std::vector<std::string>{}, std::vector<std::string>{root_.string()}}) {
+    Allow({.roots = roots, .drivers = WithVrt()});
+    for (const char* name : {"latest.vrt", "links/again.vrt", "nested.vrt"}) {
+      const auto opened = ElevationModel::Open((root_ / name).string());
+      EXPECT_TRUE(opened) << opened.error().message;
+    }
+  }
+  // A part beside the link is not the one that GDAL reads.
+  fs::copy(part, root_ / "x.tif");
+  fs::remove(part);
+  fs::create_symlink(outside_ / "secret.tif", part);
+  for (const char* name : {"latest.vrt", "nested.vrt"}) EXPECT_FALSE(OpenRaster((root_ / name).string())) << name;
 }
 
 TEST_F(SourcePolicyTest, WithoutRootsAVrtStaysInItsFolder) {
