@@ -314,6 +314,7 @@ Result<void> CheckParts(const std::string& vrt) {
     };
     const GDALDatasetUniquePtr dataset = ReopenRaster(part);
     if (dataset == nullptr || dataset->GetRasterCount() < 1) return refuse(CannotOpen(part, TakeGdalError()));
+    if (auto links = CheckNoLinks(*dataset, part); !links) return refuse(links.error());
     if (auto sidecars = CheckSidecarsAreRead(*dataset, part); !sidecars) return refuse(sidecars.error());
     if (EQUAL(dataset->GetDriverName(), "GTiff") || EQUAL(dataset->GetDriverName(), "VRT")) continue;
     if (auto complete = CheckEnd(*dataset, part, 1); !complete) return refuse(complete.error());

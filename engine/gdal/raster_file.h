@@ -35,8 +35,8 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 // kUnavailable: a GeoTIFF is truncated within the samples, overviews or mask of its first bands, or an ENVI, classic
 // netCDF or JPEG file is truncated. A truncated file can be opened, but reads of the missing part would fail later, in
 // single tiles; of ENVI and netCDF they would be zeros, of JPEG grey. Of a VRT, checks the parts: kUnavailable, an
-// ENVI, classic netCDF or JPEG file is truncated; kInvalidArgument, a part cannot be opened, or has a sidecar that GDAL
-// cannot read and would ignore. Remote files are not checked.
+// ENVI, classic netCDF or JPEG file is truncated; kInvalidArgument, a part cannot be opened, has a sidecar that GDAL
+// cannot read and would ignore, or names overviews elsewhere. Remote files are not checked.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
 // Returns the file and all files that GDAL reads with it: overviews, masks, and the parts of a mosaic with their own.

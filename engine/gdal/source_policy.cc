@@ -1,5 +1,6 @@
 #include "engine/gdal/source_policy.h"
 
+#include <cpl_conv.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gdal_priv.h>
@@ -91,6 +92,42 @@ Result<void> CheckFile(const SourcePolicy& policy, const std::string& path) {
   if (::faccessat(AT_FDCWD, real->c_str(), R_OK, AT_EACCESS) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}; give this user permission to read it", path,
                      ErrorText());
+  }
+  return {};
+}
+
+// Files with overviews that the metadata of a raster names.
+std::vector<std::string> NamedOverviews(GDALDataset& dataset, const std::string& path) {
+  std::vector<std::string> files;
+  for (const char* item : {"OVERVIEW_FILE", "MASK_OVERVIEW_FILE"}) {
+    const char* const elsewhere = dataset.GetMetadataItem(item, "OVERVIEWS");
+    if (elsewhere == nullptr) continue;
+    std::string file = elsewhere;
+    constexpr std::string_view kBase = ":::BASE:::";
+    if (file.starts_with(kBase)) file = fs::path(path).parent_path() / file.substr(kBase.size());
+    files.push_back(std::move(file));
+  }
+  return files;
+}
+
+// A file with overviews or a mask, which GDAL opens as any raster, with the overviews that this one names.
+Result<void> CheckOverviewFile(const std::string& path) {
+  if (LooksLikeVrt(path)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: is a VRT, but overviews and masks must be rasters; make them anew with gdaladdo", path);
+  }
+  const CPLConfigOptionSetter no_list("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER));
+  ForgetGdalError();
+  return dataset == nullptr ? Result<void>() : CheckNoLinks(*dataset, path);
+}
+
+Result<void> CheckOverviewsBeside(const std::string& path) {
+  for (const char* suffix : {".ovr", ".msk"}) {
+    const std::string file = path + suffix;
+    std::error_code ignored;
+    if (!fs::is_regular_file(file, ignored)) continue;
+    if (auto checked = CheckOverviewFile(file); !checked) return checked;
   }
   return {};
 }
@@ -197,18 +234,22 @@ Result<void> CheckSourceName(const std::string& path) {
 }
 
 Result<void> CheckLinks(GDALDataset& dataset, const std::string& path) {
-  const auto policy = Current();
-  for (const char* item : {"OVERVIEW_FILE", "MASK_OVERVIEW_FILE"}) {
-    const char* const elsewhere = dataset.GetMetadataItem(item, "OVERVIEWS");
-    if (elsewhere == nullptr) continue;
-    std::string file = elsewhere;
-    constexpr std::string_view kBase = ":::BASE:::";
-    if (file.starts_with(kBase)) file = fs::path(path).parent_path() / file.substr(kBase.size());
-    if (auto checked = CheckFile(*policy, file); !checked) {
+  for (const std::string& file : NamedOverviews(dataset, path)) {
+    auto checked = CheckPlainFile(file);
+    if (checked) checked = CheckOverviewFile(file);
+    if (!checked) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: names overviews elsewhere: {}", path, checked.error().message);
     }
   }
-  return {};
+  return CheckOverviewsBeside(path);
+}
+
+Result<void> CheckNoLinks(GDALDataset& dataset, const std::string& path) {
+  if (NamedOverviews(dataset, path).empty()) return CheckOverviewsBeside(path);
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: names overviews elsewhere, which only a source may; remove OVERVIEW_FILE and "
+                   "MASK_OVERVIEW_FILE from its metadata, and make overviews with gdaladdo",
+                   path);
 }
 
 std::vector<std::string> ClearGdalEnvironment() {

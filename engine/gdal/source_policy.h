@@ -35,8 +35,12 @@ Result<void> AllowVrts();
 // read), kInvalidArgument: the message has the remedy.
 Result<void> CheckSourceName(const std::string& path);
 
-// Checks that an opened file refers to allowed files only. Call it before overviews are used.
+// Checks that an opened source refers to allowed files only. Call it before overviews are used.
 Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
+
+// Checks that an opened part of a VRT, or file with overviews or a mask, names no other files. It is stricter than
+// CheckLinks because the files that they name would not be watched.
+Result<void> CheckNoLinks(GDALDataset& dataset, const std::string& path);
 
 // The checks of CheckSourceName that do not depend on the file's format, for files that no raster driver reads.
 Result<void> CheckPlainFile(const std::string& path);

@@ -60,6 +60,11 @@ class Listener {
   std::jthread thread_;
 };
 
+std::string NamingOverviews(const fs::path& file) {
+  return "<PAMDataset><Metadata domain=\"OVERVIEWS\"><MDI key=\"OVERVIEW_FILE\">" + file.string() +
+         "</MDI></Metadata></PAMDataset>";
+}
+
 // Records which files of a folder are opened.
 class OpenWatch {
  public:
@@ -379,8 +384,7 @@ TEST_F(SourcePolicyTest, WithoutRootsAVrtStaysInItsFolder) {
 
 TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {
   const std::string secret = (outside_ / "secret.tif").string();
-  Write(root_ / "dem.tif.aux.xml", "<PAMDataset><Metadata domain=\"OVERVIEWS\"><MDI key=\"OVERVIEW_FILE\">" + secret +
-                                       "</MDI></Metadata></PAMDataset>");
+  Write(root_ / "dem.tif.aux.xml", NamingOverviews(secret));
   const OpenWatch watch(outside_);
   const auto linked = OpenRaster((root_ / "dem.tif").string());
   ASSERT_FALSE(linked);
@@ -391,6 +395,33 @@ TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {
   fs::remove(root_ / "dem.tif.ovr");
   EXPECT_TRUE(OpenRaster((root_ / "dem.tif").string()));
   EXPECT_EQ(watch.Opened(), std::set<std::string>());
+}
+
+TEST_F(SourcePolicyTest, OnlyASourceNamesOverviewsElsewhere) {
+  Allow({.roots = {root_.string()}, .drivers = WithVrt()});
+  const std::string dem = (root_ / "dem.tif").string(), mosaic = (root_ / "mosaic.vrt").string();
+  const std::string overviews = WriteRaster(dir_, {}, "root/overviews.tif");
+  const auto expect_refused = [](const std::string& source, const char* why) {
+    const auto opened = ElevationModel::Open(source);
+    ASSERT_FALSE(opened) << source;
+    EXPECT_NE(opened.error().message.find(why), std::string::npos) << opened.error().message;
+  };
+  Write(mosaic, Vrt(Part("dem.tif", true)));
+  EXPECT_TRUE(ElevationModel::Open(mosaic));
+  Write(dem + ".aux.xml", NamingOverviews(overviews));
+  EXPECT_TRUE(ElevationModel::Open(dem));
+  expect_refused(mosaic, "a part of it");
+  // Overviews of the overviews.
+  Write(overviews + ".aux.xml", NamingOverviews(outside_ / "secret.tif"));
+  expect_refused(dem, "overviews.tif: names overviews elsewhere");
+  fs::remove(dem + ".aux.xml");
+  fs::copy(overviews, dem + ".ovr");
+  EXPECT_TRUE(ElevationModel::Open(dem));
+  Write(dem + ".ovr.aux.xml", NamingOverviews(outside_ / "secret.tif"));
+  expect_refused(dem, "dem.tif.ovr: names overviews elsewhere");
+  fs::remove(dem + ".ovr.aux.xml");
+  Write(dem + ".ovr", Vrt(Part((outside_ / "secret.tif").string())));
+  expect_refused(dem, "dem.tif.ovr: is a VRT");
 }
 
 TEST_F(SourcePolicyTest, RemoteNamesStayBelowTheirPrefix) {
