@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/store/look_up_gate.h"
+#include "server/store/password_file.h"
 #include "server/store/shared_store.h"
 #include "tiler/store/tile_record.h"
 #include "tiler/tile/build_id.h"
@@ -155,11 +156,9 @@ Result<SharedStoreOptions> OptionsOf(const config::SharedCacheConfig& config, st
   Result<redis::Address> address = redis::ParseAddress(config.url);
   if (!address) return MakeError(ErrorCode::kInvalidArgument, "shared_cache: {}", address.error().message);
   if (!config.password_file.empty()) {
-    std::ifstream file(config.password_file);
-    if (!std::getline(file, address->password) || address->password.empty()) {
-      return unreadable(fmt::format("{} cannot be read or is empty; it must have the password in its first line",
-                                    config.password_file));
-    }
+    Result<std::string> password = ReadPassword(config.password_file);
+    if (!password) return unreadable(password.error().message);
+    address->password = *std::move(password);
   } else if (const char* const password = std::getenv(kSharedCachePassword);
              password != nullptr) {  // NOLINT(concurrency-mt-unsafe): read before threads start
     address->password = password;

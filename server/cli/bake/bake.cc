@@ -102,7 +102,8 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
 void AddQueueSecrets(CLI::App& command, BakeArguments& arguments, const char* group) {
   command
       .add_option("--queue-password-file", arguments.queue_password_file,
-                  "File with the password of Redis; by default the environment variable TERRACE_QUEUE_PASSWORD has it")
+                  "File whose first line is the password of Redis; by default the environment variable "
+                  "TERRACE_QUEUE_PASSWORD has it")
       ->type_name("FILE")
       ->group(group);
   command

@@ -14,13 +14,13 @@
 #include <string>
 #include <utility>
 
-#include "archive/files/input_file.h"
 #include "bake/find_missing.h"
 #include "bake/place_files.h"
 #include "bake/queue/redis_queue.h"
 #include "engine/gdal/source_policy.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
+#include "server/store/password_file.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -33,17 +33,9 @@ Result<std::string> PasswordOf(const BakeArguments& arguments) {
     const char* const password = std::getenv(kPasswordVariable);
     return std::string(password == nullptr ? "" : password);
   }
-  constexpr std::uint64_t kMaxBytes = 4096;
-  auto text = archive::ReadFile(arguments.queue_password_file, kMaxBytes);
-  if (!text) {
-    return MakeError(ErrorCode::kInvalidArgument, "--queue-password-file: {}", text.error().message);
-  }
-  while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
-  if (text->empty()) {
-    return MakeError(ErrorCode::kInvalidArgument, "--queue-password-file {}: is empty; it must hold the password",
-                     arguments.queue_password_file);
-  }
-  return text;
+  auto password = server::ReadPassword(arguments.queue_password_file);
+  if (password) return password;
+  return MakeError(ErrorCode::kInvalidArgument, "--queue-password-file: {}", password.error().message);
 }
 
 // "terrain+glb/7-12-34": units of other formats have the same names.
