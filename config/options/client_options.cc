@@ -1,7 +1,6 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <string_view>
 
@@ -66,10 +65,13 @@ std::string AsBrowsersSend(std::string origin) {
 std::string CheckRange(const std::string& text) {
   const std::size_t slash = std::min(text.find('/'), text.size());
   const std::string base = text.substr(0, slash);
-  std::array<unsigned char, 16> bytes{};
-  const bool is_v4 = ::inet_pton(AF_INET, base.c_str(), bytes.data()) == 1;
-  const bool is_v6 = !is_v4 && ::inet_pton(AF_INET6, base.c_str(), bytes.data()) == 1;
-  bool fits = is_v4 || is_v6;
+  in6_addr address{};  // has room for either kind
+  const bool is_v4 = ::inet_pton(AF_INET, base.c_str(), &address) == 1;
+  const bool is_v6 = !is_v4 && ::inet_pton(AF_INET6, base.c_str(), &address) == 1;
+  if (is_v6 && slash < text.size() && IN6_IS_ADDR_V4MAPPED(&address)) {
+    return "must be written as an IPv4 range, such as \"10.0.0.0/8\"";
+  }
+  bool fits = (is_v4 || is_v6) && base.find('\0') == std::string::npos;  // c_str() ends there
   if (slash < text.size()) {
     const std::string_view digits = std::string_view(text).substr(slash + 1);
     const auto bits = ParseNumber<unsigned>(digits);

@@ -20,6 +20,7 @@ address_v6::bytes_type BytesOf(const address& any) {
 }
 
 std::optional<address> ParseAddress(std::string_view text) {
+  if (text.find('\0') != std::string_view::npos) return std::nullopt;
   boost::system::error_code error;
   const address parsed = asio::ip::make_address(std::string(text), error);
   if (error || (parsed.is_v6() && parsed.to_v6().scope_id() != 0)) return std::nullopt;
@@ -99,7 +100,9 @@ Result<AddressRanges> AddressRanges::Parse(const std::vector<std::string>& texts
     const unsigned most = base && base->is_v4() ? 32 : 128;
     std::optional<std::int64_t> bits = most;
     if (slash != std::string::npos) bits = PlainDecimal(std::string_view(text).substr(slash + 1), 3);
-    if (!base || !bits || *bits > most) {
+    // The length of an IPv4 range counts bits of IPv4.
+    const bool is_mapped = base && base->is_v4() && text.find(':') != std::string::npos;
+    if (!base || !bits || *bits > most || (is_mapped && slash != std::string::npos)) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "\"{}\" is no address or range of addresses; write one such as 10.0.0.0/8 or ::1", text);
     }

@@ -52,6 +52,10 @@ TEST(SetServerOption, TakesListsWithCommas) {
   EXPECT_THAT(config.cors_origins, IsEmpty());
   EXPECT_THAT(Set("trusted_proxies", "[::1],10.0.0.0/8", config),
               ElementsAre(IsError("--trusted-proxies", "must be an address")));
+  for (const char* range : {"::ffff:10.0.0.0/104", "::ffff:10.0.0.0/8"}) {
+    EXPECT_THAT(Set("trusted_proxies", range, config),
+                ElementsAre(IsError("--trusted-proxies", "must be written as an IPv4 range")));
+  }
   EXPECT_THAT(Set("trusted_proxies", "::1,10.0.0.0/8", config), IsEmpty());
   EXPECT_THAT(Set("tls", "/a.pem,/b.key", config), IsEmpty());
   EXPECT_EQ(config.tls, (TlsConfig{"/a.pem", "/b.key"}));

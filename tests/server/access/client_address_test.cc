@@ -30,9 +30,12 @@ TEST(AddressRanges, ContainWhatTheySay) {
 
 TEST(AddressRanges, RefuseOtherText) {
   for (const char* text : {"", "localhost", "10.0.0.0/33", "10.0.0.0/", "10.0.0.0/-1", "10.0.0.0/08", "::/129", "1.2.3",
-                           "[::1]", "10.0.0.0/8/8"}) {
+                           "[::1]", "10.0.0.0/8/8", "::ffff:10.0.0.0/104", "::ffff:10.0.0.0/8"}) {
     EXPECT_FALSE(AddressRanges::Parse({text})) << text;
   }
+  using std::string_literals::operator""s;
+  EXPECT_FALSE(AddressRanges::Parse({"10.0.0.1\0x"s}));
+  EXPECT_TRUE(AddressRanges::Parse({"::ffff:10.0.0.1"})->Contains(At("10.0.0.1")));
 }
 
 TEST(ClientBlock, IsAnAddressOrANetwork) {
