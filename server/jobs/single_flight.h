@@ -69,10 +69,10 @@ class SingleFlight {
   class WaitGuard;
   using FlightPtr = std::shared_ptr<Flight>;
 
-  void Launch(const FlightPtr& flight, BuildWork build, JobTerms terms);
+  void Launch(const FlightPtr& flight, const PoolJobPtr& job, BuildWork build);
   void RunFlight(const FlightPtr& flight, const BuildWork& build);
   void Fail(const FlightPtr& flight, const PoolJob* job, Error error);
-  void Complete(const FlightPtr& flight, Result<Value> outcome);
+  void Complete(const FlightPtr& flight, Result<Value> outcome, std::unique_lock<std::mutex> lock);
   void Forget(const FlightPtr& flight);  // mutex_ is held
 
   WorkerPool& pool_;
@@ -128,6 +128,8 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
     Key key, std::string name, BuildWork build, JobTerms terms) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor, terms.deadline);
+  auto job = std::make_shared<PoolJob>();
+  job->terms = terms;
   std::unique_lock lock(mutex_);
   if (pool_.cancelled().stop_requested()) {
     co_return FlightResult(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
@@ -135,16 +137,19 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   const auto found = flights_.find(key);
   const bool joined = found != flights_.end();
   const FlightPtr flight = joined ? found->second : std::make_shared<Flight>(key, std::move(name), pool_.cancelled());
-  flight->waiters.push_back(waiter);
-  if (!joined) flights_.emplace(key, flight);
-  const bool has_job = flight->begun || std::ranges::any_of(flight->jobs, [&](const auto& job) {
-                         const PoolJobPtr waiting = job.lock();
+  const bool has_job = flight->begun || std::ranges::any_of(flight->jobs, [&](const auto& known) {
+                         const PoolJobPtr waiting = known.lock();
                          return waiting && waiting->terms.client == terms.client;
                        });
+  // Before another job of the flight can be dropped: Fail must see that this one may still build.
+  if (!has_job) flight->jobs.push_back(job);
+  flight->waiters.push_back(waiter);
+  if (!joined) flights_.emplace(key, flight);
   lock.unlock();
   const WaitGuard guard(*this, flight, waiter);
   if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
-  if (!has_job) Launch(flight, std::move(build), terms);
+  if (!has_job) Launch(flight, job, std::move(build));
+  job = nullptr;  // the pool owns it
 
   boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
@@ -158,20 +163,14 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   co_return FlightResult(std::move(*outcome), joined);
 }
 
-// To be called without mutex_: the pool may drop another flight's job, whose on_dropped takes mutex_.
+// Submits a job that is in flight->jobs. To be called without mutex_: the pool may drop another flight's job, whose
+// on_dropped takes mutex_.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, BuildWork build, JobTerms terms) {
-  PoolJobPtr job;
+void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, const PoolJobPtr& job, BuildWork build) {
   Result<void> submitted;
   try {
-    job = std::make_shared<PoolJob>();
-    job->terms = terms;
     job->run = [this, flight, build = std::move(build)] { RunFlight(flight, build); };
     job->on_dropped = [this, flight, self = job.get()] { Fail(flight, self, DroppedJobError(flight->name)); };
-    {
-      const std::lock_guard lock(mutex_);
-      flight->jobs.push_back(job);
-    }
     submitted = pool_.Submit(job);
   } catch (const std::exception& thrown) {
     submitted = tl::unexpected(FailureOf(flight->name, thrown));
@@ -182,12 +181,11 @@ void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, BuildWork b
 // `job` will not run. The error is the outcome of the flight, unless another client's job can still build.
 template <typename Key, typename Value, typename Hash>
 void SingleFlight<Key, Value, Hash>::Fail(const FlightPtr& flight, const PoolJob* job, Error error) {
-  {
-    const std::lock_guard lock(mutex_);
-    std::erase_if(flight->jobs, [job](const auto& known) { return known.expired() || known.lock().get() == job; });
-    if (flight->begun || !flight->jobs.empty()) return;
-  }
-  Complete(flight, tl::unexpected(std::move(error)));
+  std::unique_lock lock(mutex_);
+  std::erase_if(flight->jobs, [job](const auto& known) { return known.expired() || known.lock().get() == job; });
+  if (flight->begun || !flight->jobs.empty()) return;
+  // Without unlocking: a client that joined now would lose its job.
+  Complete(flight, tl::unexpected(std::move(error)), std::move(lock));
 }
 
 // On a worker thread.
@@ -200,18 +198,18 @@ void SingleFlight<Key, Value, Hash>::RunFlight(const FlightPtr& flight, const Bu
     others.swap(flight->jobs);
   }
   for (const auto& job : others) pool_.Withdraw(job.lock());
-  Complete(flight, RunWork(flight->name, build, flight->stop.get_token()));
+  Result<Value> outcome = RunWork(flight->name, build, flight->stop.get_token());
+  Complete(flight, std::move(outcome), std::unique_lock(mutex_));
 }
 
+// `lock` holds mutex_.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Complete(const FlightPtr& flight, Result<Value> outcome) {
-  std::vector<WaiterPtr> waiters;
-  {
-    const std::lock_guard lock(mutex_);
-    flight->outcome = std::move(outcome);
-    waiters.swap(flight->waiters);
-    Forget(flight);
-  }
+void SingleFlight<Key, Value, Hash>::Complete(const FlightPtr& flight, Result<Value> outcome,
+                                              std::unique_lock<std::mutex> lock) {
+  flight->outcome = std::move(outcome);
+  std::vector<WaiterPtr> waiters = std::exchange(flight->waiters, {});
+  Forget(flight);
+  lock.unlock();
   for (WaiterPtr& waiter : waiters) Wake(std::move(waiter));
 }
 

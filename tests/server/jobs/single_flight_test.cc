@@ -42,7 +42,7 @@ bool StopComes(const std::stop_token& stop) {
 
 class SingleFlightTest : public testing::Test {
  protected:
-  explicit SingleFlightTest(unsigned threads = 2) : pool_(threads, 10'000) {}
+  explicit SingleFlightTest(unsigned threads = 2, std::size_t queue_length = 10'000) : pool_(threads, queue_length) {}
   void TearDown() override { pool_.Shutdown(); }  // its jobs refer to the flights
 
   void Join(Flights::BuildWork build, JobClock::time_point deadline,
@@ -87,6 +87,11 @@ class SingleFlightTest : public testing::Test {
 class SingleFlightOfOneWorker : public SingleFlightTest {
  protected:
   SingleFlightOfOneWorker() : SingleFlightTest(1) {}
+};
+
+class SingleFlightOfShortQueue : public SingleFlightTest {
+ protected:
+  SingleFlightOfShortQueue() : SingleFlightTest(1, 3) {}
 };
 
 TEST_F(SingleFlightTest, BuildsOnceForTwoHundred) {
@@ -276,6 +281,37 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
   io_.run();
   small.Shutdown();
   ASSERT_EQ(ends.size(), 4u);
+}
+
+// The queue always has room for who joins, because the client before it has more jobs.
+TEST_F(SingleFlightOfShortQueue, WhoJoinsWhileTheFirstJobIsDroppedStillBuilds) {
+  asio::io_context other(1);
+  const auto build = [](std::stop_token) -> Result<Value> { return SomeValue(); };
+  for (int round = 0; round < 1000; ++round) {
+    std::promise<void> gate;
+    HoldWorkers(GateOf(gate));
+    for (std::size_t key = 0; key < 3; ++key) JoinAs(key, Until(Soon(), 2), build);
+    io_.poll();
+    JoinAs(3, Until(Soon(), 4), build);  // displaces the job of key 2
+    Result<Value> joined = MakeError(ErrorCode::kCancelled, "not done");
+    asio::co_spawn(other, flights_.Join(2, "it", build, Until(Soon(), 3)),
+                   [&](std::exception_ptr, Flights::FlightResult flight) { joined = std::move(flight.value); });
+    std::atomic<bool> is_there{false};
+    std::jthread thread([&] {
+      is_there = true;
+      other.poll();
+    });
+    while (!is_there) std::this_thread::yield();
+    for (volatile int wait = round % 200; wait > 0;) wait = wait - 1;  // meets the other thread at each of its steps
+    io_.poll();
+    thread.join();
+    gate.set_value();
+    io_.run();
+    other.run();
+    ASSERT_TRUE(joined) << joined.error().message << " in round " << round;
+    io_.restart();
+    other.restart();
+  }
 }
 
 TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
