@@ -1,7 +1,5 @@
 #include "tiler/surface/drawn_points.h"
 
-#include <cmath>
-
 namespace terrace::tiler {
 namespace {
 
@@ -11,9 +9,9 @@ constexpr std::size_t kPointsBetweenStops = 1024;
 tl::unexpected<Error> Stopped() { return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more"); }
 
 std::array<float, 3> EastNorthUp(const geo::Vec3& normal, const dem::GeoPosition& point) {
-  const geo::Vec3 up = geo::SurfaceNormal(point.longitude, point.latitude);
-  const double longitude = geo::ToRadians(point.longitude);
-  const geo::Vec3 east{-std::sin(longitude), std::cos(longitude), 0}, north = geo::Cross(up, east);
+  const geo::SinCos longitude = geo::RoundedSinCos(point.longitude);
+  const geo::Vec3 up = geo::SurfaceNormal(longitude, geo::RoundedSinCos(point.latitude));
+  const geo::Vec3 east{-longitude.sin, longitude.cos, 0}, north = geo::Cross(up, east);
   return {static_cast<float>(geo::Dot(normal, east)), static_cast<float>(geo::Dot(normal, north)),
           static_cast<float>(geo::Dot(normal, up))};
 }

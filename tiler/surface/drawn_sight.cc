@@ -84,14 +84,15 @@ class BorderCrossings {
  private:
   // A meridian is a half plane.
   void AddMeridian(double longitude, const auto& add) const {
-    const double sine = std::sin(geo::ToRadians(longitude)), cosine = std::cos(geo::ToRadians(longitude));
+    const auto [sine, cosine] = geo::RoundedSinCos(longitude);
     add((start_.y * cosine - start_.x * sine) / (way_.x * sine - way_.y * cosine));
   }
   // The places of one geodetic latitude, at all heights, are a cone: the normals of the ellipsoid meet in one point of
   // the axis.
   void AddParallel(double latitude, const auto& add) const {
-    const double sine = std::sin(geo::ToRadians(latitude)), cosine = std::cos(geo::ToRadians(latitude));
-    const double z = start_.z + geo::kEccentricitySquared * geo::PrimeVerticalRadius(latitude) * sine;
+    const geo::SinCos angle = geo::RoundedSinCos(latitude);
+    const auto [sine, cosine] = angle;
+    const double z = start_.z + geo::kEccentricitySquared * geo::PrimeVerticalRadius(angle) * sine;
     const double s2 = sine * sine, c2 = cosine * cosine;
     const double a = (way_.x * way_.x + way_.y * way_.y) * s2 - way_.z * way_.z * c2;
     const double b = 2 * ((start_.x * way_.x + start_.y * way_.y) * s2 - z * way_.z * c2);
