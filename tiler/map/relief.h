@@ -16,7 +16,7 @@ namespace terrace::tiler {
 inline constexpr int kReliefMargin = 1;
 
 // Metres of height per metre to the east and to the north; NaN where there is no height. A neighbour without a height
-// counts with the pixel's own height.
+// counts as if the ground went on as on the pixel's other side; without a height there, with the pixel's own height.
 struct Gradient {
   double east = 0, north = 0;
 };
