@@ -400,7 +400,7 @@ TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {
 TEST_F(SourcePolicyTest, OnlyASourceNamesOverviewsElsewhere) {
   Allow({.roots = {root_.string()}, .drivers = WithVrt()});
   const std::string dem = (root_ / "dem.tif").string(), mosaic = (root_ / "mosaic.vrt").string();
-  const std::string overviews = WriteRaster(dir_, {}, "root/overviews.tif");
+  const std::string overviews = WriteRaster(dir_, {.width = 8, .height = 8}, "root/overviews.tif");
   const auto expect_refused = [](const std::string& source, const char* why) {
     const auto opened = ElevationModel::Open(source);
     ASSERT_FALSE(opened) << source;
