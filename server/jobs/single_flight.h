@@ -53,9 +53,9 @@ class SingleFlight {
 
   // Waits for the flight of `key`, or starts one. Each client that joins queues its own `build` with its `terms`, and
   // the first that a worker takes runs: builds of one key must be equivalent. `name` is for messages. An exception of
-  // `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the flight's job. kCancelled: the deadline
-  // passed, the awaiting coroutine was cancelled, or the pool was cancelled before `build` began. kUnavailable: the
-  // pool was cancelled before this call. Otherwise the result of `build`.
+  // `build` counts as FailureOf says. kOverloaded: the pool refused or dropped the flight's job. kCancelled: the
+  // deadline passed, the awaiting coroutine was cancelled, or the pool was cancelled before `build` began. Otherwise
+  // the result of `build`.
   asio::awaitable<FlightResult> Join(Key key, std::string name, BuildWork build, JobTerms terms);
 
   std::size_t in_flight() const {
@@ -132,7 +132,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   job->terms = terms;
   std::unique_lock lock(mutex_);
   if (pool_.cancelled().stop_requested()) {
-    co_return FlightResult(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
+    co_return FlightResult(MakeError(ErrorCode::kCancelled, "the server is shutting down"), false);
   }
   const auto found = flights_.find(key);
   const bool joined = found != flights_.end();

@@ -28,7 +28,7 @@ void Wake(WaiterPtr waiter) {
 
 Error FailureOf(std::string_view name, const std::exception& thrown) {
   const bool is_memory_short = dynamic_cast<const std::bad_alloc*>(&thrown) != nullptr;
-  const ErrorCode code = is_memory_short ? ErrorCode::kOverloaded : ErrorCode::kInternal;
+  const ErrorCode code = is_memory_short ? ErrorCode::kOverloaded : ErrorCode::kUnavailable;
   try {
     // Logged here, because the log leaves out other refusals under load.
     if (is_memory_short)

@@ -50,7 +50,7 @@ class TileService {
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
   // For tiles that Find has not found: counts a miss, and joins a flight or starts one, which looks in the stores and
-  // builds the tile if none has it. Errors: those of TilePipeline::Build, and kOverloaded, kCancelled, kUnavailable of
+  // builds the tile if none has it. Errors: those of TilePipeline::Build, and kOverloaded and kCancelled of
   // SingleFlight::Join. Errors are not cached. The coroutine must run on a single thread. `client`: of JobTerms
   // (fair_queue.h). Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request,

@@ -333,7 +333,7 @@ TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
   io_.restart();
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, Soon());
   io_.run();
-  EXPECT_EQ(flights_done_[1].value.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(flights_done_[1].value.error().code, ErrorCode::kCancelled);
 }
 
 TEST_F(SingleFlightTest, RefusesWhatThePoolRefuses) {
@@ -341,7 +341,7 @@ TEST_F(SingleFlightTest, RefusesWhatThePoolRefuses) {
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, Soon());
   io_.run();
   ASSERT_EQ(flights_done_.size(), 1u);
-  EXPECT_EQ(flights_done_[0].value.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(flights_done_[0].value.error().code, ErrorCode::kCancelled);
   EXPECT_EQ(flights_.in_flight(), 0u);
 }
 

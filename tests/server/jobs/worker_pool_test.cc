@@ -175,7 +175,7 @@ TEST(WorkerPool, RunTellsAShortageOfMemoryFromOtherExceptions) {
   EXPECT_EQ(short_of.error().message, "work for one request: no memory");
   const auto failed =
       RunAside<int>(pool, [](std::stop_token) -> Result<int> { throw std::out_of_range("index 7"); }).get();
-  EXPECT_EQ(failed.error().code, ErrorCode::kInternal);
+  EXPECT_EQ(failed.error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(failed.error().message, "work for one request: index 7");
 }
 
