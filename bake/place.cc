@@ -171,8 +171,8 @@ bool IsContent(const std::string& name) {
 }
 
 bool IsOurs(const std::string& name) {
-  return name == kIdentityFile || name == kPlaceIdFile || name == kExportFolder || name == archive::kManifestFile ||
-         name == "lost+found" || IsContent(name) || IsLock(name) || IsPartial(name);
+  return name == kIdentityFile || name == kPlaceIdFile || name == archive::kManifestFile || name == "lost+found" ||
+         IsContent(name) || IsLock(name) || IsPartial(name);
 }
 
 // The differences between a written identity and this one, as one sentence; empty: none.
@@ -260,13 +260,14 @@ PlaceLock::~PlaceLock() {
   if (!file_.empty() && ReadText(file_).value_or("") == OwnLock() + '\n') Remove(file_);
 }
 
-Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
+Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation,
+                        bool is_exported_later) {
   const Result<std::vector<std::string>> names = NamesIn(place);
   if (!names) return tl::unexpected(names.error());
   std::string content;
   for (const std::string& name : *names) {
     if (IsContent(name)) content = name;
-    if (IsOurs(name)) continue;
+    if (IsOurs(name) || (is_exported_later && name == kExportFolder)) continue;
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: holds something that is no bake ({}); give an empty or a new folder with --out", place, name);
   }
@@ -344,8 +345,6 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
     for (const fs::path& file : unknown) Remove(file);
   }
   RemoveLeftovers(place, folders);
-  std::error_code ignored;
-  fs::remove_all(fs::path(place) / kExportFolder, ignored);  // a bucket has none
   Remove(fs::path(place) / kPlaceIdFile);
 }
 

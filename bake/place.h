@@ -44,14 +44,16 @@ struct BakeIdentity {
 std::string ToJson(const BakeIdentity& identity);
 
 // Checks that the place can take this bake, and writes the identity there. The place is empty, or holds a bake of the
-// same identity: an unfinished one, or a finished one of this `generation`. kInvalidArgument: it holds something else,
-// or another bake; the message says what differs and what to do. kUnavailable: it cannot be read or written.
-Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
+// same identity: an unfinished one, or a finished one of this `generation`. `is_exported_later`: it may hold
+// kExportFolder. kInvalidArgument: it holds something else, or another bake; the message says what differs and what to
+// do. kUnavailable: it cannot be read or written.
+Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation,
+                        bool is_exported_later);
 
 // The folder in a place where another form of the finished bake is written before it is renamed to its own place.
 inline constexpr const char* kExportFolder = "export";
 
-// Removes what only an unfinished bake needs: the number of the place (PlaceId), unfinished files and exports of killed
+// Removes what only an unfinished bake needs: the number of the place (PlaceId), unfinished files of killed
 // processes, and locks of processes of which it is known that they have ended. The identity stays: with it, a bake that
 // loses its manifest is an unfinished one, whose files are checked and kept.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);

@@ -10,6 +10,7 @@
 #include <random>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "archive/files/bucket.h"
 #include "archive/files/input_file.h"
@@ -73,7 +74,9 @@ Result<std::vector<std::string>> NamesIn(const fs::path& folder) {
   std::vector<std::string> names;
   for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::directory_iterator();
        entry.increment(error)) {
-    names.push_back(entry->path().filename().string());
+    std::string name = entry->path().filename().string();
+    // An NFS client keeps a file that was removed while it was open under such a name until it is closed.
+    if (!name.starts_with(".nfs")) names.push_back(std::move(name));
   }
   if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", folder.string(), error.message());
   return names;

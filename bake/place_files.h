@@ -19,8 +19,8 @@ Result<bool> Exists(const std::filesystem::path& file);
 // The whole file. kNotFound: there is none. kUnavailable: it cannot be read. kInvalidArgument: an object of more than
 // 1 MiB. Messages name it.
 Result<std::string> ReadText(const std::filesystem::path& file);
-// The names directly below a folder. Errors: there is no such folder, it cannot be read, or it is in a bucket and
-// without objects (archive::NamesInBucket).
+// The names directly below a folder, without what an NFS client keeps of removed files. Errors: there is no such
+// folder, it cannot be read, or it is in a bucket and without objects (archive::NamesInBucket).
 Result<std::vector<std::string>> NamesIn(const std::filesystem::path& folder);
 // Removes a file if it is there; all errors are ignored.
 void Remove(const std::filesystem::path& file);

@@ -425,6 +425,18 @@ class Bake(BakeCase):
         self.assertEqual(plain.returncode, 0, plain.stderr)
         self.assertNotIn("gzip", plain.stderr)
 
+    def test_files_of_others_in_a_folder_named_export_stay(self):
+        for form in ("chunks", "folder"):
+            place = self.place(form)
+            others = (place if form == "chunks" else place.with_name(place.name + ".bake")) / "export/thesis.txt"
+            others.parent.mkdir(parents=True)
+            others.write_text("x")
+            (others.parent / "folder.partial").mkdir()
+            done = self.run_bake("--out", place, "--form", form, levels="0-3")
+            self.assertEqual(done.returncode, 2 if form == "chunks" else 0, done.stderr)
+            self.assertEqual(others.read_text(), "x")
+        self.assertEqual([path.name for path in others.parent.parent.rglob("*")], ["export", "thesis.txt"])
+
     def test_dry_run_counts_the_tiles(self):
         manifest, tiles = archive(self.reference)
         done = self.run_bake("--dry-run", "--json")

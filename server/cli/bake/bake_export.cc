@@ -78,16 +78,34 @@ bool WasExported(const std::string& baked, const BakeArguments& arguments, const
   return !noted.empty() && noted == NoteOf(arguments.out, arguments.form, identity, generation);
 }
 
+namespace {
+
+// Removes what Export writes into the folder of the export, and the folder if nothing else is in it.
+void RemoveExport(const fs::path& folder) {
+  std::error_code ignored;
+  for (const std::string& name : bake::NamesIn(folder).value_or(std::vector<std::string>())) {
+    for (const char* const form : {kSingle, kFolder, k3tz}) {
+      const bool is_partial = name.starts_with(fmt::format("{}.", form)) && name.ends_with(archive::kPartial);
+      if (name == form || is_partial) fs::remove_all(folder / name, ignored);
+    }
+  }
+  fs::remove(folder / kNoteFile, ignored);
+  fs::remove(folder, ignored);
+}
+
+}  // namespace
+
 // The note is removed last: as long as it is there, WasExported knows the bake.
 void RemoveBake(const std::string& baked) {
   std::error_code ignored;
   for (const std::string& name : bake::NamesIn(baked).value_or(std::vector<std::string>())) {
     if (name != bake::kExportFolder) fs::remove_all(fs::path(baked) / name, ignored);
   }
-  fs::remove_all(baked, ignored);
+  RemoveExport(fs::path(baked) / bake::kExportFolder);
+  fs::remove(baked, ignored);
 }
 
-// The export is written in the folder of the bake, where the next run removes what a killed process has left.
+// The export is written in the folder of the bake. What a killed process has left there is removed first.
 Result<void> Export(const BakeArguments& arguments, const std::string& baked, const bake::BakeIdentity& identity,
                     std::uint64_t generation, const std::stop_token& stop) {
   const auto archive = archive::Archive::Open(baked);
@@ -96,6 +114,7 @@ Result<void> Export(const BakeArguments& arguments, const std::string& baked, co
                      : arguments.form == kFolder ? archive::WriteFolder
                                                  : archive::Write3tz;
   const fs::path folder = fs::path(baked) / bake::kExportFolder;
+  RemoveExport(folder);
   const std::string made = folder / arguments.form;
   if (auto written = write(**archive, made, stop); !written) return written;
   const std::string note = NoteOf(made, arguments.form, identity, generation);

@@ -307,7 +307,7 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
     std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
     return kExitOk;
   }
-  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
+  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation, !is_chunked); !claimed) {
     return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
   }
   if (!worker.empty() && IsFinished(place, targets)) return kExitOk;
