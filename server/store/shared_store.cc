@@ -163,11 +163,12 @@ std::optional<redis::Reply> SharedStore::Ask(const redis::Command& command) {
 }
 
 std::optional<std::string> SharedStore::Find(const std::string& key) {
-  // A value of any length is answered with at most this many bytes; a longer one fails its checksum.
-  const std::optional<redis::Reply> reply =
-      Ask({"GETRANGE", NameOf(key), "0", std::to_string(options_.max_value_bytes + kChecksumBytes)});
+  // A value of any length is answered with at most one byte more than the longest that is wanted.
+  const std::size_t max_bytes = options_.max_value_bytes + kChecksumBytes;
+  const std::optional<redis::Reply> reply = Ask({"GETRANGE", NameOf(key), "0", std::to_string(max_bytes)});
   if (!reply) return std::nullopt;
-  if (reply->kind() == redis::ReplyView::Kind::kText && reply->text().empty()) {  // GETRANGE of nothing
+  // GETRANGE of nothing is empty. A longer value may be of a server with another limit: it is not damaged.
+  if (reply->kind() == redis::ReplyView::Kind::kText && (reply->text().empty() || reply->text().size() > max_bytes)) {
     ++misses_;
     return std::nullopt;
   }

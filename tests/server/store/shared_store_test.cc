@@ -51,6 +51,24 @@ TEST(SharedStore, FindsWhatRedisHas) {
   EXPECT_EQ(tier.stats().damaged, 1U);
 }
 
+TEST(SharedStore, AValueOfAServerWithAHigherLimitIsAMissAndStays) {
+  FakeRedis redis;
+  const SharedStoreOptions options = OptionsOf(redis, 1);
+  SharedStore tier(options);
+  Await([&] { return tier.stats().on; });
+  const std::string longest(options.max_value_bytes, 'x');
+  redis.SetValue(tiler::AddChecksum("key", longest));
+  EXPECT_EQ(tier.Find("key"), longest);
+  redis.SetValue(tiler::AddChecksum("key", longest + "x"));
+  EXPECT_EQ(tier.Find("key"), std::nullopt);
+  EXPECT_EQ(tier.stats().misses, 1U);
+  EXPECT_EQ(tier.stats().damaged, 0U);
+  tier.Keep(
+      "other", [] { return std::string("value"); }, 5);  // written after all erasures
+  Await([&] { return tier.stats().written == 1; });
+  EXPECT_EQ(redis.erased(), 0U);
+}
+
 TEST(SharedStore, SilenceCostsOneTimeOutAndNoFurtherCommand) {
   FakeRedis redis;
   SharedStoreOptions options = OptionsOf(redis, 1);
