@@ -232,19 +232,23 @@ Result<std::size_t> SharedStore::Erase(const std::string& prefix,
   std::size_t erased = 0;
   {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return !is_writing_; });  // a batch on its way would be written after the scan
     std::erase_if(queue_, [&](const Job& job) {
       if (!job.value || !job.key.starts_with(prefix) || !is_chosen(job.key)) return false;
       queued_bytes_ -= job.charge;
       ++erased;
       return true;
     });
+    // A batch on its way would be written after the scan. Later batches have no such value of before.
+    const std::uint64_t batch = batches_;
+    changed_.wait(lock, stop, [&] { return !is_writing_ || batches_ != batch; });
   }
+  const auto stopped = [] { return MakeError(ErrorCode::kCancelled, "stopped while the shared cache was purged"); };
+  if (stop.stop_requested()) return stopped();
   const Result<ConnectionPtr> connection = Open(kWriteTimeout, kScanReplyBytes);
   if (!connection) return tl::unexpected(connection.error());
   std::string cursor = "0";
   do {
-    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped while the shared cache was purged");
+    if (stop.stop_requested()) return stopped();
     const auto page = (*connection)->Call({"SCAN", cursor, "MATCH", PatternOf(NameOf(prefix)), "COUNT", "1000"});
     if (!page) return tl::unexpected(page.error());
     redis::Command unlink = {"UNLINK"};
@@ -287,7 +291,10 @@ void SharedStore::Run() {
     if (connects) Connect();
     if (writes) Write();
     lock.lock();
-    if (std::exchange(is_writing_, false)) changed_.notify_all();
+    if (std::exchange(is_writing_, false)) {
+      ++batches_;
+      changed_.notify_all();
+    }
   }
   dropped_ += queue_.size();
 }

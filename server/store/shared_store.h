@@ -118,7 +118,7 @@ class SharedStore {
 
   const SharedStoreOptions options_;
   mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   bool on_ = false;
   std::uint64_t epoch_ = 0;  // counts how often it was switched off; connections of earlier epochs are closed
   struct Idle {
@@ -134,6 +134,7 @@ class SharedStore {
   std::unordered_map<std::string, Clock::time_point> leases_;  // taken and not released, by key: when they end
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
+  std::uint64_t batches_ = 0;                    // that are no longer on their way
   std::vector<std::string> reported_;            // the reasons in the log since reported_at_
   Clock::time_point reported_at_, answered_at_;  // when the log first reported one of them; that Redis answers
 

@@ -94,6 +94,7 @@ void FakeRedis::Serve(int fd) {
       const std::lock_guard lock(mutex_);
       replies += reply_;
     }
+    if (Count(text, "\r\nSCAN\r\n") > 0) replies += "*2\r\n$1\r\n0\r\n*0\r\n";
     for (std::uint64_t i = 0; i < erased; ++i) replies += ":1\r\n";
     for (std::uint64_t i = 0; i < written; ++i) replies += is_held ? "$-1\r\n" : "+OK\r\n";
     if (!is_silent) ::send(fd, replies.data(), replies.size(), MSG_NOSIGNAL);

@@ -1,4 +1,4 @@
-// A server that answers PING, SET, UNLINK and GETRANGE as Redis does, or not at all, and counts them.
+// A server that answers PING, SET, UNLINK, GETRANGE and SCAN (no keys) as Redis does, or not at all, and counts them.
 #pragma once
 
 #include <atomic>

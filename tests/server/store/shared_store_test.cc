@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <functional>
+#include <future>
 #include <new>
 #include <thread>
 #include <vector>
@@ -190,6 +191,25 @@ TEST(SharedStore, AValueThatCannotBeEncodedIsDropped) {
   tier.Keep(
       "key", [] { return std::string("value"); }, 5);
   Await([&] { return tier.stats().written == 1; });
+}
+
+TEST(SharedStore, ErasesAlsoWhileValuesAreWrittenWithoutEnd) {
+  FakeRedis redis;
+  std::atomic<bool> goes_on{true};
+  std::function<std::string()> value;
+  SharedStore tier(OptionsOf(redis, 1));
+  Await([&] { return tier.stats().on; });
+  // While it is written, the next one is waiting.
+  value = [&] {
+    if (goes_on) tier.Keep("key", value, 5);
+    return std::string("value");
+  };
+  tier.Keep("key", value, 5);
+  Await([&] { return tier.stats().written > 0; });
+  auto erased = std::async(std::launch::async, [&] { return tier.Erase("a", [](auto) { return true; }, {}); });
+  EXPECT_EQ(erased.wait_for(seconds(20)), std::future_status::ready);
+  goes_on = false;
+  EXPECT_EQ(erased.get().value_or(1), 0U);
 }
 
 TEST(SharedStore, ReleasesOnlyItsOwnLeases) {
