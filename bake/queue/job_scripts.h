@@ -6,12 +6,13 @@
 //   terrace:{JOB}:dead    stream: the units that were given up: unit, why, deliveries, worker
 //   terrace:{JOB}:taken   hash: unit -> "id worker milliseconds", by Redis's clock; for people
 //   terrace:{JOB}:done    stream: the last units that were done: unit, worker, seconds; for people
-//   terrace:{JOB}:errors  hash: unit -> why it failed last
+//   terrace:{JOB}:errors  hash: unit -> "worker why" of its last failure
+//   terrace:{JOB}:workers hash: worker -> milliseconds, by Redis's clock, when it was heard of last
 //
-// The keys that are for people, and the errors, are accessed by pcall, because they may hold a value of another type.
-// A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node of a cluster.
-// The incarnation is a random number that is made whenever the queue is filled. A worker that took its unit from an
-// earlier filling must not acknowledge it in a later one.
+// The keys that are for people, the errors and the workers are accessed by pcall, because they may hold a value of
+// another type. A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node
+// of a cluster. The incarnation is a random number that is made whenever the queue is filled. A worker that took its
+// unit from an earlier filling must not acknowledge it in a later one.
 #pragma once
 
 namespace terrace::bake::scripts {
@@ -24,9 +25,15 @@ inline constexpr const char* kNobody = "-";
 // Before each of the others. KEYS: as above. ARGV[1]: the incarnation; empty: there is no job. Redis 6.2 needs
 // replicate_commands for scripts that ask the time and then write.
 inline constexpr const char* kPrelude = R"lua(
-local job, units, dead, taken, done, errors = KEYS[1], KEYS[2], KEYS[3], KEYS[4], KEYS[5], KEYS[6]
+local job, units, dead, taken, done, errors, workers = unpack(KEYS)
 if redis.replicate_commands then redis.replicate_commands() end
 if (redis.call('HGET', job, 'incarnation') or '') ~= ARGV[1] then return {'gone'} end
+local function note_worker(worker)
+  local time = redis.call('TIME')
+  local now = time[1] .. string.format('%03d', math.floor(time[2] / 1000))
+  redis.pcall('HSET', workers, worker, now)
+  return now
+end
 local function remove(id, name)
   local noted = redis.pcall('HGET', taken, name)
   if type(noted) == 'string' and string.sub(noted, 1, #id + 1) == id .. ' ' then redis.call('HDEL', taken, name) end
@@ -40,7 +47,7 @@ end
 // script, and never DEL.
 inline constexpr const char* kFill = R"lua(
 redis.call('HSET', job, 'state', 'filling')
-redis.call('DEL', job, units, dead, taken, done, errors)
+redis.call('DEL', unpack(KEYS))
 local fields = tonumber(ARGV[2])
 for i = 1, fields do redis.call('HSET', job, ARGV[1 + 2 * i], ARGV[2 + 2 * i]) end
 redis.call('XGROUP', 'CREATE', units, 'bakers', '0', 'MKSTREAM')
@@ -57,21 +64,37 @@ return {'ok'}
 )lua";
 
 // ARGV: incarnation, worker, lease in ms. Hands out new units first, then units whose worker was silent for a lease,
-// last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter.
+// last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter. The worker with
+// which a unit failed last does not get it again while others are heard of: a unit is given up because of itself, not
+// because of one worker without room or sources.
 inline constexpr const char* kTake = R"lua(
 local worker, lease = ARGV[2], ARGV[3]
+local now = note_worker(worker)
 local function hand_out(message, deliveries)
   local name = ''
   for i = 1, #message[2], 2 do
     if message[2][i] == 'unit' then name = message[2][i + 1] end
   end
-  local time = redis.call('TIME')
-  redis.pcall('HSET', taken, name, message[1] .. ' ' .. worker .. ' ' .. time[1] .. string.format('%03d', math.floor(time[2] / 1000)))
+  redis.pcall('HSET', taken, name, message[1] .. ' ' .. worker .. ' ' .. now)
   return {'unit', message[1], name, deliveries}
 end
 local function new()
   local streams = redis.call('XREADGROUP', 'GROUP', 'bakers', worker, 'COUNT', 1, 'STREAMS', units, '>')
   return streams and streams[1][2][1]
+end
+local others
+local function has_others()
+  if others ~= nil then return others end
+  others = false
+  local heard = redis.pcall('HGETALL', workers)
+  for i = 1, #heard, 2 do
+    if heard[i] ~= worker and tonumber(now) - (tonumber(heard[i + 1]) or 0) < tonumber(lease) then others = true end
+  end
+  return others
+end
+local function failed_here(message)
+  local noted = redis.pcall('HGET', errors, message[2][2])
+  return type(noted) == 'string' and string.sub(noted, 1, #worker + 1) == worker .. ' '
 end
 local message = new()
 if message then return hand_out(message, 1) end
@@ -81,7 +104,9 @@ repeat
   from = claimed[1]
   message = claimed[2][1]
   if message then
-    return hand_out(message, redis.call('XPENDING', units, 'bakers', message[1], message[1], 1)[1][4])
+    local deliveries = redis.call('XPENDING', units, 'bakers', message[1], message[1], 1)[1][4]
+    if not (failed_here(message) and has_others()) then return hand_out(message, deliveries) end
+    redis.call('XCLAIM', units, 'bakers', '-', 0, message[1], 'IDLE', lease, 'RETRYCOUNT', deliveries - 1, 'JUSTID')
   end
 until from == '0-0'
 if redis.call('XLEN', units) > 0 then return {'wait'} end
@@ -93,6 +118,7 @@ return hand_out(new(), 1)
 
 // ARGV: incarnation, worker, ids. Renews the leases of those ids that this worker still holds.
 inline constexpr const char* kBeat = R"lua(
+note_worker(ARGV[2])
 for i = 3, #ARGV do
   local pending = redis.call('XPENDING', units, 'bakers', ARGV[i], ARGV[i], 1)[1]
   if pending and pending[2] == ARGV[2] then
@@ -125,7 +151,7 @@ return {'ok'}
 inline constexpr const char* kGiveBack = R"lua(
 local pending = redis.call('XPENDING', units, 'bakers', ARGV[2], ARGV[2], 1)[1]
 if not pending or pending[2] ~= ARGV[4] then return {'ok'} end
-if ARGV[5] ~= '' then redis.pcall('HSET', errors, ARGV[3], ARGV[5]) end
+if ARGV[5] ~= '' then redis.pcall('HSET', errors, ARGV[3], ARGV[4] .. ' ' .. ARGV[5]) end
 redis.pcall('HDEL', taken, ARGV[3])
 redis.call('XCLAIM', units, 'bakers', '-', 0, ARGV[2], 'IDLE', ARGV[7], 'RETRYCOUNT', ARGV[6], 'JUSTID')
 return {'ok'}
@@ -136,7 +162,8 @@ inline constexpr const char* kBury = R"lua(
 local why = ARGV[5]
 if why == '' then
   why = redis.pcall('HGET', errors, ARGV[3])
-  if type(why) ~= 'string' then why = 'its workers ended before it was done: killed, out of memory, or cut off' end
+  why = type(why) == 'string' and string.match(why, '^%S+ (.*)$')
+  if not why then why = 'its workers ended before it was done: killed, out of memory, or cut off' end
 end
 if remove(ARGV[2], ARGV[3]) then
   redis.call('XADD', dead, '*', 'unit', ARGV[3], 'why', why, 'deliveries', ARGV[6], 'worker', ARGV[4])

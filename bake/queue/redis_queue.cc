@@ -13,8 +13,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// After a failed attempt at a unit, after a take that found no unit, and after a failed connection.
+// After a failed attempt at a unit, longer after each further one; after a take that found no unit, and after a failed
+// connection.
 constexpr milliseconds kPauseAfterFailure{500}, kPauseWithoutUnits{500}, kPauseWithoutRedis{1000};
+
+constexpr int kFailuresToReport = 5;  // one after the other
 
 std::string RandomName() {
   std::random_device random;
@@ -309,6 +312,7 @@ void RedisQueue::Done(std::size_t unit) {
   Send(held.mapped(), scripts::kDone, {options_.units[unit], options_.worker, fmt::format("{:.3f}", seconds)});
   outbox_.back().done = held.mapped().id;
   done_.insert(held.mapped().id);
+  failures_ = 0;
   next_take_ = {};  // it may have been the last unit of the job: the next call of Take asks at once
 }
 
@@ -326,6 +330,13 @@ bool RedisQueue::Fail(std::size_t unit, const Error& why) {
   if (held.empty()) return true;
   const int deliveries = held.mapped().deliveries;
   const std::string message = why.message.empty() ? "failed" : why.message;
+  // A worker without room or sources fails at once, and must not take all units from the others.
+  constexpr int kMaxDoublings = 10;
+  next_take_ = Clock::now() + std::min(kPauseAfterFailure * (1 << std::min(failures_++, kMaxDoublings)), lease_ / 8);
+  if (failures_ == kFailuresToReport && options_.on_message) {
+    options_.on_message(
+        fmt::format("the last {} units failed here: {}; if other workers bake them, end this one", failures_, message));
+  }
   if (deliveries >= kMaxAttempts) {
     Send(held.mapped(), scripts::kBury, {options_.units[unit], options_.worker, message, std::to_string(deliveries)});
     return false;

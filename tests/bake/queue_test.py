@@ -140,6 +140,23 @@ class Queue(QueueCase):
         self.assertEqual(self.baked(out), sorted(dead))
         self.expect_equal(place)
 
+    def test_a_worker_that_always_fails_spoils_nothing(self):
+        place, box = self.place(), ("--bbox", "12.4,30.4,12.6,30.6")
+        right = self.start(place, *box, lease=20)
+        right.stdout.readline()
+        right.send_signal(signal.SIGSTOP)  # the other worker is heard of for a lease, and takes nothing
+        broken = self.start(place, *box, lease=20, limit=1000)
+        until = time.monotonic() + 60
+        while self.redis("XLEN", self.key("units")) > self.redis("HLEN", self.key("errors")) + 1:
+            self.assertLess(time.monotonic(), until)
+            time.sleep(0.02)
+        time.sleep(2)  # to try them again
+        deliveries = [entry[3] for entry in self.redis("XPENDING", self.key("units"), "bakers", "-", "+", 100)]
+        self.assertEqual(set(deliveries), {1}, "a unit that failed is for the other worker")
+        right.send_signal(signal.SIGCONT)
+        self.end_all((right, broken))
+        self.assertTrue((place / "manifest.json").exists())
+
     def test_a_unit_that_kills_its_workers_is_given_up(self):
         place = self.place()
         begun = self.start(place)
