@@ -1,5 +1,6 @@
 #include "archive/pmtiles/directory.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -11,7 +12,6 @@ namespace terrace::archive {
 namespace {
 
 constexpr std::string_view kMagic = "PMTiles\x03";
-constexpr std::size_t kMaxDirectoryBytes = std::size_t{256} << 20;  // not compressed
 
 tl::unexpected<Error> BadHeader(const char* what) { return MakeError(ErrorCode::kInvalidArgument, "{}", what); }
 tl::unexpected<Error> BadDirectory() { return MakeError(ErrorCode::kInvalidArgument, "a directory is damaged"); }
@@ -152,13 +152,18 @@ std::string EncodeDirectory(const std::vector<DirectoryEntry>& entries) {
 }
 
 Result<std::vector<DirectoryEntry>> DecodeDirectory(std::string_view compressed, std::uint64_t leaves,
-                                                    std::uint64_t data) {
-  const std::optional<std::string> bytes = proto::Gunzip(compressed, kMaxDirectoryBytes);
+                                                    std::uint64_t data, std::uint64_t max_entries) {
+  // Of the varints of an entry, and of the count.
+  constexpr std::size_t kMinEntryBytes = 4, kMaxEntryBytes = 30, kMaxCountBytes = 10;
+  max_entries = std::min<std::uint64_t>(max_entries, kMaxDirectoryBytes / kMinEntryBytes);
+  const std::optional<std::string> bytes = proto::Gunzip(
+      compressed, std::min<std::size_t>(kMaxDirectoryBytes, kMaxCountBytes + max_entries * kMaxEntryBytes));
   if (!bytes) return BadDirectory();
   VarintReader reader(*bytes);
   const std::uint64_t count = reader.Get();
-  constexpr std::size_t kMinEntryBytes = 4;
-  if (!reader.ok() || count == 0 || count > reader.remaining() / kMinEntryBytes) return BadDirectory();
+  if (!reader.ok() || count == 0 || count > max_entries || count > reader.remaining() / kMinEntryBytes) {
+    return BadDirectory();
+  }
   std::vector<DirectoryEntry> entries(count);
   std::uint64_t last_id = 0;
   for (DirectoryEntry& entry : entries) {

@@ -51,9 +51,12 @@ struct DirectoryEntry {
 
 // Compressed. Precondition: at least one entry, in the order of their ids.
 std::string EncodeDirectory(const std::vector<DirectoryEntry>& entries);
+// More than the directories of 10^10 tiles have, which a writer divides so that the root fits into the head.
+inline constexpr std::size_t kMaxDirectoryBytes = std::size_t{32} << 20;  // compressed or not
 // Checks that ids rise, runs do not overlap, and lengths are above 0. Leaf directories (run 0) must lie within `leaves`
-// bytes, tiles within `data` bytes. kInvalidArgument: one of these does not hold.
+// bytes, tiles within `data` bytes. Memory is taken for at most `max_entries`. kInvalidArgument: there are more, or one
+// of these does not hold.
 Result<std::vector<DirectoryEntry>> DecodeDirectory(std::string_view compressed, std::uint64_t leaves,
-                                                    std::uint64_t data);
+                                                    std::uint64_t data, std::uint64_t max_entries);
 
 }  // namespace terrace::archive

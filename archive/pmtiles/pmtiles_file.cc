@@ -39,7 +39,7 @@ Result<void> PmtilesFile::ReadHead(std::size_t max_metadata_bytes) {
   header_ = *header;
   Result<std::vector<DirectoryEntry>> root =
       DecodeDirectory(std::string_view(*head).substr(header_.root.offset, header_.root.length), header_.leaves.length,
-                      header_.data.length);
+                      header_.data.length, header_.leaves.length / kRowBytes);
   if (!root) return tl::unexpected(Damaged(root.error().message));
   root_ = *std::move(root);
   if (std::ranges::any_of(root_, [](const DirectoryEntry& entry) { return entry.run > 0; })) {
@@ -55,13 +55,16 @@ Result<void> PmtilesFile::ReadHead(std::size_t max_metadata_bytes) {
 }
 
 Result<PmtilesFile::LeafPtr> PmtilesFile::ReadLeaf(const DirectoryEntry& leaf) const {
-  const Result<std::string> bytes = file_->Read(header_.leaves.offset + leaf.offset, leaf.length);
-  if (!bytes) return tl::unexpected(bytes.error());
-  Result<std::vector<DirectoryEntry>> entries = DecodeDirectory(*bytes, header_.leaves.length, header_.data.length);
-  if (!entries) return tl::unexpected(Damaged(entries.error().message));
   auto made = std::make_shared<Leaf>();
   made->rows_at = header_.leaves.offset + leaf.offset + leaf.length;
   const std::uint64_t max_rows = (header_.leaves.end() - made->rows_at) / kRowBytes;
+  if (leaf.length > kMaxDirectoryBytes) return tl::unexpected(Damaged("a directory is too long"));
+  const Result<std::string> bytes = file_->Read(header_.leaves.offset + leaf.offset, leaf.length);
+  if (!bytes) return tl::unexpected(bytes.error());
+  // An entry has a row for each of its tiles.
+  Result<std::vector<DirectoryEntry>> entries =
+      DecodeDirectory(*bytes, header_.leaves.length, header_.data.length, max_rows);
+  if (!entries) return tl::unexpected(Damaged(entries.error().message));
   std::uint64_t rows = 0;
   for (const DirectoryEntry& entry : *entries) {
     made->rows_before.push_back(rows);

@@ -53,22 +53,33 @@ TEST(DirectoryTest, GoesBothWays) {
                                                {9, 0, 10, 1},
                                                {70'000'000'000, 15, 1'000'000, 1},
                                                {70'000'000'009, 5'000'000'000, 1, 1}};
-  const Result<std::vector<DirectoryEntry>> read = DecodeDirectory(EncodeDirectory(entries), 0, 5'000'000'001);
+  const Result<std::vector<DirectoryEntry>> read = DecodeDirectory(EncodeDirectory(entries), 0, 5'000'000'001, 5);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(*read, entries);
 }
 
 TEST(DirectoryTest, EntriesBeyondTheFileAreRefused) {
   const std::vector<DirectoryEntry> entries = {{0, 0, 10, 1}, {1, 10, 5, 1}};
-  EXPECT_TRUE(DecodeDirectory(EncodeDirectory(entries), 0, 15));
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory(entries), 0, 14));
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{0, ~std::uint64_t{0} - 1, 10, 1}}), 0, 100)) << "offset overflows";
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{0, 0, 0, 1}}), 0, 100)) << "empty tile";
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{5, 0, 1, 3}, {7, 1, 1, 1}}), 0, 100)) << "runs overlap";
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{5, 0, 1, 1}, {5, 1, 1, 1}}), 0, 100)) << "an id twice";
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{~std::uint64_t{0}, 0, 1, 1}}), 0, 100)) << "id overflows";
-  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({}), 0, 100)) << "no entries";
-  EXPECT_FALSE(DecodeDirectory("", 0, 100));
+  EXPECT_TRUE(DecodeDirectory(EncodeDirectory(entries), 0, 15, 2));
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory(entries), 0, 14, 2));
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{0, ~std::uint64_t{0} - 1, 10, 1}}), 0, 100, 2)) << "offset overflows";
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{0, 0, 0, 1}}), 0, 100, 2)) << "empty tile";
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{5, 0, 1, 3}, {7, 1, 1, 1}}), 0, 100, 2)) << "runs overlap";
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{5, 0, 1, 1}, {5, 1, 1, 1}}), 0, 100, 2)) << "an id twice";
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({{~std::uint64_t{0}, 0, 1, 1}}), 0, 100, 2)) << "id overflows";
+  EXPECT_FALSE(DecodeDirectory(EncodeDirectory({}), 0, 100, 2)) << "no entries";
+  EXPECT_FALSE(DecodeDirectory("", 0, 100, 2));
+}
+
+// A leaf of 4 MB in 4 kB, in a file that has no room for the rows of its tiles.
+TEST(DirectoryTest, MoreEntriesThanTheFileHasRoomForAreRefusedBeforeTheyAreDecompressed) {
+  std::vector<DirectoryEntry> entries(1'000'000);
+  for (std::size_t i = 0; i < entries.size(); ++i) entries[i] = {i, i, 1, 1};
+  const std::string leaf = EncodeDirectory(entries);
+  EXPECT_LT(leaf.size(), 50'000U);
+  EXPECT_TRUE(DecodeDirectory(leaf, 0, entries.size(), entries.size()));
+  EXPECT_FALSE(DecodeDirectory(leaf, 0, entries.size(), entries.size() - 1));
+  EXPECT_FALSE(DecodeDirectory(leaf, 0, entries.size(), 1000));
 }
 
 class PmtilesTest : public ::testing::Test {
