@@ -14,6 +14,7 @@
 #include "archive/documents.h"
 #include "archive/files/output_file.h"
 #include "archive/files/zip_writer.h"
+#include "archive/manifest_json.h"
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/pmtiles_mapping.h"
 #include "archive/static_tileset.h"
@@ -86,8 +87,17 @@ class PartialFolder {
 
 }  // namespace
 
+Result<void> CheckSingle(const std::string& out, const Manifest& manifest) {
+  const Result<void> checked = CheckBounds(SingleMetadata(manifest));
+  if (checked) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "{}: its metadata would be too large: {}; bake chunks, fewer levels or a smaller area", out,
+                   checked.error().message);
+}
+
 Result<void> WriteSingle(const Archive& archive, const std::string& out, const std::stop_token& stop) {
   const Manifest& manifest = archive.manifest();
+  if (Result<void> checked = CheckSingle(out, manifest); !checked) return checked;
   Result<PmtilesOptions> file_options = PmtilesOptionsOf(manifest.kind, std::nullopt);
   if (!file_options) return tl::unexpected(std::move(file_options.error()));
   SetBounds(manifest, *file_options);

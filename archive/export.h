@@ -11,7 +11,10 @@
 
 namespace terrace::archive {
 
-// One PMTiles file with all tiles; Archive::Open reads it.
+// kInvalidArgument: readers would refuse the file that WriteSingle makes of an archive with this manifest, because its
+// metadata are too large.
+Result<void> CheckSingle(const std::string& out, const Manifest& manifest);
+// One PMTiles file with all tiles; Archive::Open reads it. kInvalidArgument: see CheckSingle.
 Result<void> WriteSingle(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
 // A folder for static hosts: {z}/{x}/{y}.terrain with layer.json, {z}/{x}/{y}.png with tiles.json, or tileset.json with

@@ -10,8 +10,7 @@
 namespace terrace::archive {
 namespace {
 
-// Ten times as many as the manifest of all land of the Earth at 30 m has. A value takes more than 20 bytes, so that
-// ParseManifest takes each manifest of this size.
+// Ten times as many as the manifest of all land of the Earth at 30 m has.
 constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{32} << 20;
 
 Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) {
@@ -25,7 +24,23 @@ Result<Manifest> ReadSingle(const std::string& path) {
   return ManifestOf(path, (*file)->metadata());
 }
 
+// A manifest that is larger than readers take must not end a bake.
+Result<void> CheckJson(const std::string& path, const std::string& json) {
+  Result<void> checked = CheckBounds(json);
+  if (checked && json.size() > kMaxManifestBytes) {
+    checked =
+        MakeError(ErrorCode::kInvalidArgument, "it has {} bytes, and the limit is {}", json.size(), kMaxManifestBytes);
+  }
+  if (checked) return {};
+  return MakeError(ErrorCode::kInvalidArgument, "{}: would be too large: {}; bake fewer levels or a smaller area", path,
+                   checked.error().message);
+}
+
 }  // namespace
+
+Result<void> CheckManifest(const std::string& place, const Manifest& manifest) {
+  return CheckJson(place + "/" + kManifestFile, ToJson(manifest));
+}
 
 Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata) {
   const Result<std::string> json = ManifestIn(metadata);
@@ -35,12 +50,7 @@ Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata
 
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
   const std::string path = place + "/" + kManifestFile, json = ToJson(manifest);
-  // A manifest that is larger than readers take must not end a bake.
-  if (json.size() > kMaxManifestBytes) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: would have {} bytes, and the limit is {}; bake fewer levels or a smaller area", path,
-                     json.size(), kMaxManifestBytes);
-  }
+  if (Result<void> checked = CheckJson(path, json); !checked) return checked;
   if (const Result<std::string> there = ReadFile(path, kMaxManifestBytes); there && *there == json) return {};
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));

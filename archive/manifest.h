@@ -91,8 +91,11 @@ std::string ToJson(const Manifest& manifest);
 // kInvalidArgument: not a manifest, or one of a newer format; the message names what is wrong.
 Result<Manifest> ParseManifest(std::string_view json);
 
+// kInvalidArgument: readers would refuse the manifest of `place`, because it is too large.
+Result<void> CheckManifest(const std::string& place, const Manifest& manifest);
 // Writes manifest.json by rename, so that it is complete or absent. Does not touch a manifest with the same content, so
-// that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written.
+// that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written. kInvalidArgument:
+// see CheckManifest.
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
 // The manifest in the metadata of an archive in one file. Errors: those of ParseManifest; they name `path`.
 Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata);

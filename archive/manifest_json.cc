@@ -74,9 +74,8 @@ T WholeOf(const Json& json, T min, T max) {
 }
 constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
-// Parses JSON that may be made to harm: a value of two bytes takes fifty in memory, and functions of Json call
-// themselves for nested values. Throws Wrong, and what Json::parse throws.
-Json ParseBounded(std::string_view text) {
+// How JSON is too large; empty: it is not.
+std::string BeyondBounds(std::string_view text) {
   // Ten times as many as the manifest of all land of the Earth at 30 m has.
   constexpr int kMaxValues = 2'000'000, kMaxDepth = 64;
   int values = 1, depth = 0;
@@ -92,12 +91,17 @@ Json ParseBounded(std::string_view text) {
     if (c == ',' || c == '[' || c == '{') ++values;
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') --depth;
-    if (values > kMaxValues) {
-      throw Wrong(fmt::format("it has more than {} values, which no bake writes; copy it again", kMaxValues));
-    }
-    if (depth > kMaxDepth) {
-      throw Wrong(fmt::format("it is nested more than {} deep, which no bake writes; copy it again", kMaxDepth));
-    }
+    if (values > kMaxValues) return fmt::format("it has more than {} values", kMaxValues);
+    if (depth > kMaxDepth) return fmt::format("it is nested more than {} deep", kMaxDepth);
+  }
+  return {};
+}
+
+// Parses JSON that may be made to harm: a value of two bytes takes fifty in memory, and functions of Json call
+// themselves for nested values. Throws Wrong, and what Json::parse throws.
+Json ParseBounded(std::string_view text) {
+  if (const std::string beyond = BeyondBounds(text); !beyond.empty()) {
+    throw Wrong(beyond + ", which no bake writes; copy it again");
   }
   return Json::parse(text);
 }
@@ -312,6 +316,12 @@ std::string ToJson(const Manifest& manifest) {
   }
   json[kChecksumMember] = ChecksumOf(json);
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Result<void> CheckBounds(std::string_view json) {
+  const std::string beyond = BeyondBounds(json);
+  if (beyond.empty()) return {};
+  return MakeError(ErrorCode::kInvalidArgument, "{}", beyond);
 }
 
 Result<Manifest> ParseManifest(std::string_view text) {

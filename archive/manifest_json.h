@@ -16,6 +16,9 @@ inline constexpr const char* kManifestMember = "terrace";
 // kInvalidArgument: the text is not a JSON object, has no such member, or has too many values.
 Result<std::string> ManifestIn(std::string_view metadata);
 
+// kInvalidArgument: ParseManifest and ManifestIn would refuse the text because of the number or depth of its values.
+Result<void> CheckBounds(std::string_view json);
+
 // The number that 16 hexadecimal digits state; nothing for any other text.
 std::optional<std::uint64_t> ParseHex16(std::string_view text);
 

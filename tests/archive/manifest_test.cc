@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
+#include "archive/documents.h"
+#include "archive/export.h"
 #include "archive/unit_name.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
@@ -142,6 +146,28 @@ TEST(ManifestTest, NonsenseIsRefused) {
         with("fedcba9876543210", "fedcba"), std::string(), std::string("[]"), std::string(100'000, '[')}) {
     EXPECT_FALSE(ParseManifest(bad)) << bad.substr(0, 200);
   }
+}
+
+TEST(ManifestTest, OneThatReadersRefuseIsNotWritten) {
+  const test_support::ScratchDirectory scratch;
+  Manifest manifest = FullManifest();
+  manifest.available.back().assign(420'000, {4, 2, 5, 3});
+  const std::string json = ToJson(manifest);
+  EXPECT_LT(json.size(), std::size_t{32} << 20) << "small enough, but with too many values";
+  EXPECT_FALSE(ParseManifest(json));
+  const Result<void> written = WriteManifest(scratch.path().string(), manifest);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+}
+
+TEST(ManifestTest, ASingleFileStatesRangesTwice) {
+  Manifest manifest = FullManifest();
+  EXPECT_TRUE(CheckSingle("out.pmtiles", manifest));
+  manifest.available.back().assign(300'000, {4, 2, 5, 3});
+  EXPECT_TRUE(CheckManifest("out", manifest));
+  EXPECT_FALSE(ManifestOf("out.pmtiles", SingleMetadata(manifest))) << "what a reader would find";
+  EXPECT_FALSE(CheckSingle("out.pmtiles", manifest));
 }
 
 TEST(ManifestTest, UnitNames) {

@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <system_error>
-#include <vector>
 
 #include "archive/archive.h"
 #include "archive/export.h"
@@ -52,6 +51,15 @@ Result<void> CheckExportPlace(const std::string& out, const std::string& form) {
   }
   return MakeError(ErrorCode::kInvalidArgument, "{}: is there already; remove it, or give another place with --out",
                    out);
+}
+
+Result<void> CheckSizes(const BakeArguments& arguments, const std::vector<bake::Target>& targets) {
+  for (const bake::Target& target : targets) {
+    auto fits = archive::CheckManifest(target.place, target.manifest);
+    if (fits && arguments.form == kSingle) fits = archive::CheckSingle(arguments.out, target.manifest);
+    if (!fits) return fits;
+  }
+  return {};
 }
 
 namespace {

@@ -295,6 +295,7 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out, arguments.form);
   if (!free && !is_exported()) return Fail(free.error());
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
+  if (const auto fits = CheckSizes(arguments, targets); !fits) return Fail(fits.error());
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
   if (!worker.empty()) lock_name = bake::LockOfWorker(worker, arguments.job);
