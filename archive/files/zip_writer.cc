@@ -130,6 +130,7 @@ Result<void> ZipWriter::Finish() {
                      kMax32 / kIndexedBytes, index_.size());
   }
   ByteWriter index;
+  index.Reserve(index_.size() * kIndexedBytes);
   for (const Indexed& entry : index_) {
     for (const std::uint64_t number : {entry.low, entry.high, entry.offset}) index.Put(number);
   }

@@ -1,4 +1,5 @@
-// Reads PMTiles files that PmtilesWriter wrote. Any other bytes give an error, never a wrong tile. Thread-safe.
+// Reads PMTiles files that PmtilesWriter wrote. Files of other programs give an error, damaged ones an error or the
+// right tile. Checksums are no signatures: whoever can write the file can make it say anything. Thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -44,7 +44,7 @@ const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable() {
        .is_used = [](const SharedCacheConfig& cache) { return cache.url.starts_with("rediss://"); }},
       {.key = "timeout_ms",
        .value = "MS",
-       .help = "Longest time that a request waits for Redis",
+       .help = "Longest time that a request waits for a reply of Redis",
        .details = "After a time-out or an error the server waits 1 s, and uses Redis again when it has answered a test",
        .codec = Integer(&SharedCacheConfig::timeout_ms, 1, 1000)},
       {.key = "min_build_ms",
