@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "archive/files/bucket.h"
+#include "archive/files/output_file.h"
 #include "archive/unit_name.h"
 #include "bake/place_files.h"
 #include "engine/core/errno_text.h"
@@ -110,11 +111,9 @@ Result<void> MakeFolder(const std::string& place) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is a file; a bake needs a folder: give another place with --out",
                      place);
   }
-  fs::create_directories(place, error);
-  std::error_code ignored;
-  if (!fs::is_directory(place, ignored)) {
+  if (const int failed = archive::CreateFolders(place); failed != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be created: {}; give a folder that can be written with --out",
-                     place, error.message());
+                     place, ErrorText(failed));
   }
   if (::access(place.c_str(), W_OK | X_OK) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a folder that can be written with --out",
@@ -190,9 +189,11 @@ Result<void> CheckSame(const std::string& place, const std::string& noted_json, 
                        const std::string& noted_in) {
   const auto noted = nlohmann::ordered_json::parse(noted_json, nullptr, /*allow_exceptions=*/false);
   if (!noted.is_object()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: does not say what is baked there; remove the folder {}, or give another with --out", noted_in,
-                     place);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: does not say what is baked there; if a bake has just begun there, run the same command again, "
+        "else give another folder with --out",
+        noted_in);
   }
   const std::string differences = Differences(noted, identity);
   if (differences.empty()) return {};

@@ -1,11 +1,13 @@
 #include "bake/place_files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <random>
 #include <system_error>
@@ -14,6 +16,7 @@
 
 #include "archive/files/bucket.h"
 #include "archive/files/input_file.h"
+#include "archive/files/output_file.h"
 #include "engine/core/errno_text.h"
 
 namespace terrace::bake {
@@ -121,13 +124,21 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     return why(sync_error);
   }
   int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
-  if (error == EPERM || error == EOPNOTSUPP || error == ENOSYS) {  // a file system without links
+  // An NFS client that repeats a request whose reply was lost is told that the link exists, which it has made itself.
+  struct stat status {};
+  if (error == EEXIST && ::stat(own.c_str(), &status) == 0 && status.st_nlink > 1) error = 0;
+  const auto has_no_links = [&] { return error == EPERM || error == EOPNOTSUPP || error == ENOSYS; };
+  if (has_no_links()) {
+    error = ::renameat2(AT_FDCWD, own.c_str(), AT_FDCWD, file.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+  }
+  if (has_no_links() || error == EINVAL) {  // others may see it empty for a moment
     const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     error = made < 0 ? errno : 0;
     if (made >= 0) ::close(made);
     if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) error = errno;
   }
   ::unlink(own.c_str());
+  if (error == 0) error = archive::SyncFolder(fs::path(file).parent_path().string());
   if (error == 0) return true;
   if (error == EEXIST) return false;
   return why(error);

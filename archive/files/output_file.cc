@@ -10,6 +10,7 @@
 #include <system_error>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "archive/files/bucket.h"
 #include "engine/common/content_hash.h"
@@ -75,9 +76,7 @@ int CreateNameless(const TemporaryPlace& place) {
 }
 
 Result<void> MakeFolder(const TemporaryPlace& place) {
-  std::error_code error;
-  std::filesystem::create_directories(place.folder, error);
-  if (error) return CannotWrite(place.folder, error.value());
+  if (const int error = CreateFolders(place.folder); error != 0) return CannotWrite(place.folder, error);
   return {};
 }
 
@@ -154,12 +153,32 @@ std::string OutputFile::xxh3() const {
 }
 
 // Some file systems do not allow fsync of folders, and do not need it.
+int SyncFolder(const std::string& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return errno == EACCES ? 0 : errno;  // files can be made where names cannot be listed
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
+  ::close(descriptor);
+  return error == EINVAL || error == ENOTSUP || error == EBADF ? 0 : error;
+}
+
+int CreateFolders(const std::string& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> missing;
+  for (std::filesystem::path at = folder; !at.empty() && !std::filesystem::exists(at, error); at = at.parent_path()) {
+    missing.push_back(at);
+  }
+  std::filesystem::create_directories(folder, error);
+  std::error_code ignored;
+  if (error && !std::filesystem::is_directory(folder, ignored)) return error.value();
+  for (const std::filesystem::path& made : missing) {
+    if (const int failed = SyncFolder(made.parent_path().string()); failed != 0) return failed;
+  }
+  return 0;
+}
+
 Result<void> Rename(const std::string& from, const std::string& to) {
   if (::rename(from.c_str(), to.c_str()) != 0) return CannotWrite(to, errno);
-  const int folder = ::open(TemporaryPlaceOf(to).folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder < 0) return {};
-  ::fsync(folder);
-  ::close(folder);
+  if (const int error = SyncFolder(TemporaryPlaceOf(to).folder); error != 0) return CannotWrite(to, error);
   return {};
 }
 
@@ -167,7 +186,10 @@ Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {
   const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode); };
   int descriptor = open();
   if (descriptor < 0 && errno == ENOENT) {
-    if (Result<void> made = MakeFolder(TemporaryPlaceOf(path)); !made) return made;
+    std::error_code error;
+    const std::string folder = TemporaryPlaceOf(path).folder;
+    std::filesystem::create_directories(folder, error);
+    if (error) return CannotWrite(folder, error.value());
     descriptor = open();
   }
   if (descriptor < 0) return CannotWrite(path, errno);

@@ -40,6 +40,11 @@ class OutputFile {
   std::unique_ptr<Impl> impl_;
 };
 
+// Waits until the names in a folder are on the disk. Creates a folder and its parents, and waits until their names are
+// on the disk. Both return 0, or why not, as errno does.
+int SyncFolder(const std::string& folder);
+int CreateFolders(const std::string& folder);
+
 // Renames a complete file or folder. The new name is on the disk afterwards. kUnavailable: as OutputFile.
 Result<void> Rename(const std::string& from, const std::string& to);
 

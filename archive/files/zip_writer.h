@@ -15,9 +15,9 @@
 
 namespace terrace::archive {
 
-// Used by one thread at a time. The same entries in the same order make the same bytes. Takes up to 96
-// bytes of memory for each entry, most of it in Finish. Destroyed without Finish: removes what it wrote. Errors: those
-// of OutputFile.
+// Used by one thread at a time. The same entries in the same order make the same bytes. Takes up to 96 bytes
+// of memory for each entry, most of it in Finish. Destroyed without Finish: removes what it wrote. Errors: those of
+// OutputFile.
 class ZipWriter {
  public:
   // `start`: where the first entry begins, after a hole; readers of zip files allow it. For tests of large files.

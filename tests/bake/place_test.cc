@@ -39,5 +39,27 @@ TEST(Place, WhatAnNfsClientKeepsOfRemovedFilesIsNothing) {
   EXPECT_TRUE(ClaimPlace(scratch.path().string(), kIdentity, 1, /*is_exported_later=*/false));
 }
 
+// bake.json is empty for a moment where a file system has neither links nor exclusive renames.
+TEST(Place, AnEmptyIdentityDoesNotCostTheUnits) {
+  const test_support::ScratchDirectory scratch;
+  Write(scratch.path() / "units" / "7-1-2.pmtiles");
+  std::ofstream(scratch.path() / "bake.json").flush();
+  const auto claimed = ClaimPlace(scratch.path().string(), kIdentity, 1, /*is_exported_later=*/false);
+  ASSERT_FALSE(claimed);
+  EXPECT_EQ(claimed.error().message.find("remove"), std::string::npos) << claimed.error().message;
+}
+
+TEST(Place, ANewFolderAndItsParentsAreCreated) {
+  const test_support::ScratchDirectory scratch;
+  const fs::path place = scratch.path() / "a/b/c";
+  {
+    const auto lock = PlaceLock::Take(place.string(), "");
+    ASSERT_TRUE(lock) << lock.error().message;
+    EXPECT_TRUE(fs::exists(place / "bake.lock"));
+    EXPECT_FALSE(PlaceLock::Take(place.string(), ""));
+  }
+  EXPECT_TRUE(fs::is_empty(place));
+}
+
 }  // namespace
 }  // namespace terrace::bake
