@@ -27,16 +27,29 @@ constexpr std::uint32_t kRegularFile = 0100644U << 16;
 
 using Md5 = std::array<unsigned char, EVP_MAX_MD_SIZE>;
 
+// The index finds entries by MD5, which protects nothing. So it is also right where OpenSSL allows only algorithms of
+// FIPS 140 by default. Null: there is none.
+const EVP_MD* Md5Algorithm() {
+  static const EVP_MD* const kAlgorithm = ::EVP_MD_fetch(nullptr, "MD5", "-fips");
+  return kAlgorithm;
+}
+
 Md5 Md5Of(std::string_view text) {
   Md5 hash{};
   unsigned size = 0;
-  TERRACE_CHECK(::EVP_Digest(text.data(), text.size(), hash.data(), &size, ::EVP_md5(), nullptr) == 1);
+  TERRACE_CHECK(::EVP_Digest(text.data(), text.size(), hash.data(), &size, Md5Algorithm(), nullptr) == 1);
   return hash;
 }
 
 }  // namespace
 
 Result<ZipWriter> ZipWriter::Create(const std::string& path, std::uint64_t start) {
+  if (Md5Algorithm() == nullptr) {
+    return MakeError(ErrorCode::kUnavailable,
+                     "{} cannot be written: the index of a 3TZ file needs MD5, which the OpenSSL of this machine does "
+                     "not have; activate its default provider, or use --form folder",
+                     path);
+  }
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));
   if (start > 0) {

@@ -17,7 +17,7 @@ namespace terrace::archive {
 
 // Used by one thread at a time. The same entries in the same order make the same bytes. Takes up to 96 bytes
 // of memory for each entry, most of it in Finish. Destroyed without Finish: removes what it wrote. Errors: those of
-// OutputFile.
+// OutputFile; kUnavailable, too: OpenSSL has no MD5.
 class ZipWriter {
  public:
   // `start`: where the first entry begins, after a hole; readers of zip files allow it. For tests of large files.

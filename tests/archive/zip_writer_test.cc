@@ -2,6 +2,7 @@
 #include "archive/files/zip_writer.h"
 
 #include <gtest/gtest.h>
+#include <openssl/evp.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -91,6 +92,18 @@ TEST(ZipWriter, ReadsBackAtTheStart) { WriteAndRead(0); }
 TEST(ZipWriter, PassesFourGibibytes) { WriteAndRead(kFar - 2500); }
 TEST(ZipWriter, BeginsAtTheLastOffsetOf32Bits) { WriteAndRead(kFar - 1); }
 TEST(ZipWriter, BeginsBeyondFourGibibytes) { WriteAndRead(kFar + 12345); }
+
+TEST(ZipWriterTest, IsWrittenWhereOpensslAllowsOnlyFipsByDefault) {
+  const test_support::ScratchDirectory scratch;
+  const std::string path = (scratch.path() / "fips.3tz").string();
+  ASSERT_EQ(::EVP_default_properties_enable_fips(nullptr, 1), 1);
+  auto zip = ZipWriter::Create(path);
+  ASSERT_TRUE(zip) << zip.error().message;
+  EXPECT_TRUE(zip->Add("tileset.json", "{}"));
+  EXPECT_TRUE(zip->Finish());
+  ::EVP_default_properties_enable_fips(nullptr, 0);
+  EXPECT_EQ(IndexOf(path, 1).size(), 1U);
+}
 
 }  // namespace
 }  // namespace terrace::archive
