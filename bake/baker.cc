@@ -66,7 +66,8 @@ class Run {
         queue_(queue),
         options_(options),
         counters_(counters),
-        reports_(plan.units.size()) {}
+        reports_(plan.units.size()),
+        is_tried_again_(plan.units.size()) {}
 
   std::vector<UnitReport> Execute() {
     {
@@ -159,7 +160,7 @@ class Run {
   UnitPtr Open(const UnitQueue::Taken& taken) {
     const std::size_t index = taken.unit;
     const UnitPlan::Entry& entry = plan_.units[index];
-    if (taken.attempt == 0) Forget(index);
+    Forget(index);
     WaitBefore(taken.attempt);
     auto unit = std::make_shared<OpenUnit>();
     unit->index = index;
@@ -303,8 +304,13 @@ class Run {
     }
     if (options_.stop.stop_requested()) return queue_.Return(unit.index);
     if (!unit.error) return queue_.Done(unit.index);
+    {
+      const std::lock_guard lock(mutex_);
+      is_tried_again_[unit.index] = true;
+    }
     if (queue_.Fail(unit.index, *unit.error)) return;
     const std::lock_guard lock(mutex_);
+    is_tried_again_[unit.index] = false;
     for (OpenUnit::Output& output : unit.outputs) {
       if (HasReportLocked(unit.index, output.target)) continue;
       ReportLocked(unit.index, {output.target,
@@ -315,9 +321,11 @@ class Run {
     }
   }
 
-  // Forgets the reports of an earlier attempt: a unit that is handed out anew is done from the beginning.
+  // A unit that is handed out anew is done from the beginning, unless its last attempt failed here: then the files that
+  // were written stay.
   void Forget(std::size_t index) {
     const std::lock_guard lock(mutex_);
+    if (std::exchange(is_tried_again_[index], false)) return;
     counters_.units -= reports_[index].size();
     reports_[index].clear();
   }
@@ -351,6 +359,7 @@ class Run {
   std::uint64_t changes_ = 0;  // so that none is missed between Take, which needs no lock, and waiting
   std::list<UnitPtr> open_;
   std::vector<std::vector<UnitReport>> reports_;  // by unit
+  std::vector<char> is_tried_again_;              // by unit: its last attempt failed here
 };
 
 }  // namespace

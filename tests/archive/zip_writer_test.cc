@@ -93,7 +93,7 @@ TEST(ZipWriter, PassesFourGibibytes) { WriteAndRead(kFar - 2500); }
 TEST(ZipWriter, BeginsAtTheLastOffsetOf32Bits) { WriteAndRead(kFar - 1); }
 TEST(ZipWriter, BeginsBeyondFourGibibytes) { WriteAndRead(kFar + 12345); }
 
-TEST(ZipWriterTest, IsWrittenWhereOpensslAllowsOnlyFipsByDefault) {
+TEST(ZipWriter, IsWrittenWhereOpensslAllowsOnlyFipsByDefault) {
   const test_support::ScratchDirectory scratch;
   const std::string path = (scratch.path() / "fips.3tz").string();
   ASSERT_EQ(::EVP_default_properties_enable_fips(nullptr, 1), 1);

@@ -38,13 +38,19 @@ class ThrowingWriter final : public archive::UnitWriter {
   bool has_tile_ = false;
 };
 
-// Expects that one unit fails with this message, and the others are baked.
-void ExpectOneFailure(Throws throws, int levels, const std::string& message) {
+tiler::Dataset SampleDataset() {
   tiler::Dataset dataset;
   dataset.name = "jacksboro";
   auto source = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
-  ASSERT_TRUE(source) << source.error().message;
-  dataset.model = *std::move(source);
+  EXPECT_TRUE(source) << source.error().message;
+  if (source) dataset.model = *std::move(source);
+  return dataset;
+}
+
+// Expects that one unit fails with this message, and the others are baked.
+void ExpectOneFailure(Throws throws, int levels, const std::string& message) {
+  tiler::Dataset dataset = SampleDataset();
+  ASSERT_TRUE(dataset.model);
   BakeRequest request;
   request.levels = {0, levels};
   const auto manifests = PlanArchives(dataset, request, "test");
@@ -74,6 +80,39 @@ TEST(Baker, WhatIsThrownIsAnErrorOfTheUnit) {
   ExpectOneFailure(Throws::kInAdd, archive::kTopLevels, "statistics cannot be read");
   ExpectOneFailure(Throws::kInFinish, archive::kTopLevels, "no memory");
   ExpectOneFailure(Throws::kInCreate, 0, "statistics cannot be read");
+}
+
+// Hands out unit 0 again after it was done, as a queue that was filled anew, after another worker had it and was lost.
+class ForgetfulQueue final : public UnitQueue {
+ public:
+  Taken Take() override { return done_ < 2 ? Taken{Taken::State::kUnit, 0, done_} : Taken{}; }
+  void Done(std::size_t) override { ++done_; }
+  void Return(std::size_t) override {}
+  bool Fail(std::size_t, const Error&) override { return false; }
+
+ private:
+  int done_ = 0;
+};
+
+TEST(Baker, AUnitThatIsHandedOutAfterItWasDoneIsDoneAgain) {
+  tiler::Dataset dataset = SampleDataset();
+  ASSERT_TRUE(dataset.model);
+  BakeRequest request;
+  request.levels = {0, 0};
+  const auto manifests = PlanArchives(dataset, request, "test");
+  ASSERT_TRUE(manifests) << manifests.error().message;
+  std::vector<Target> targets = {{{}, manifests->front()}};
+  int writers = 0;
+  targets.front().create = [&]() -> Result<std::unique_ptr<archive::UnitWriter>> {
+    ++writers;
+    return std::make_unique<ThrowingWriter>(Throws::kInAdd, geo::TileKey{30, 0, 0});
+  };
+  const tiler::TilePipeline pipeline({std::move(dataset)}, 0);
+  ForgetfulQueue queue;
+  Counters counters;
+  const std::vector<UnitReport> reports = Bake(pipeline, targets, UnitPlan::Make(targets, {}), queue, {}, counters);
+  EXPECT_EQ(writers, 2);
+  EXPECT_EQ(reports.size(), 1U);
 }
 
 }  // namespace
