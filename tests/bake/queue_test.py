@@ -88,6 +88,18 @@ class Queue(QueueCase):
         self.end(first)
         self.expect_equal(place)
 
+    def test_a_worker_that_is_late_sees_that_all_is_done(self):
+        place = self.place()
+        late = self.start(place)
+        self.stop_within_a_unit(late, place)
+        self.run_bake(place)
+        # As if another late worker had begun the job anew, with a new number of the place.
+        self.redis("HSET", self.key("job"), "state", "baking", "incarnation", "other", "place (bake-place.id)", "other")
+        late.send_signal(signal.SIGCONT)
+        _, errors = self.end(late)
+        self.assertIn("is complete already", errors)
+        self.expect_equal(place)
+
     @in_parallel.alone
     def test_a_slow_unit_is_not_inherited_while_its_worker_lives(self):
         place = self.place()

@@ -47,6 +47,12 @@ std::string NameInQueue(const bake::UnitPlan::Entry& entry, const std::vector<ba
   return name + "/" + entry.unit.name;
 }
 
+bool HasAllManifests(const std::string& place, const std::vector<bake::Target>& targets) {
+  std::vector<archive::Manifest> manifests;
+  std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
+  return bake::TidyIfFinished(place, manifests);
+}
+
 void PrintMessage(const std::string& message) { std::fprintf(stderr, "terrace: %s\n", message.c_str()); }
 
 Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
@@ -66,7 +72,12 @@ Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
   options.identity.emplace_back("place (bake-place.id)", *place_id);
   options.worker = bake.worker;
   for (const bake::UnitPlan::Entry& entry : bake.plan.units) options.units.push_back(NameInQueue(entry, bake.targets));
-  options.find_missing = [&bake, &dataset] {
+  options.find_missing = [&bake, &dataset]() -> Result<std::vector<std::size_t>> {
+    // The job ended after this worker had looked. It must not begin anew, with a number of the place that others do not
+    // have.
+    if (HasAllManifests(bake.place, bake.targets)) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: is complete already", bake.place);
+    }
     return bake::FindMissing(dataset, bake.targets, bake.plan, bake.options.stop);
   };
   options.lease = std::chrono::milliseconds(static_cast<std::int64_t>(bake.arguments.lease * 1000));
@@ -147,9 +158,7 @@ std::string WorkerName() {
 }
 
 bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets) {
-  std::vector<archive::Manifest> manifests;
-  std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
-  if (!bake::TidyIfFinished(place, manifests)) return false;
+  if (!HasAllManifests(place, targets)) return false;
   PrintMessage(fmt::format("{}: is complete already; --finish instead of --queue checks every file", place));
   return true;
 }
@@ -184,6 +193,7 @@ int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<
       case bake::RedisQueue::End::kIncomplete:
         return ListDead(bake, **queue);
       default:
+        if (IsFinished(bake.place, bake.targets)) return kExitOk;
         return Fail((*queue)->Why());
     }
   }
