@@ -1,6 +1,9 @@
 #include "bake/place.h"
 
+#include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -137,6 +140,22 @@ bool IsPartial(const std::string& name) {
   return is_ours && name.ends_with(".partial");
 }
 
+// Removes the lock of a process that has ended, but not one with which another process has replaced it meanwhile. Those
+// that want to remove it run on one machine (Owner::HasEnded), so they can exclude one another by flock.
+void RemoveStaleLock(const std::string& file) {
+  if (archive::IsBucket(file)) return Remove(file);
+  int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);                    // NFS: flock needs write access
+  if (descriptor < 0) descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);  // another user's
+  if (descriptor < 0) return;
+  const bool is_locked = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+  struct stat opened {
+  }, now{};
+  const bool is_there = ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &now) == 0 &&
+                        opened.st_dev == now.st_dev && opened.st_ino == now.st_ino;
+  if (is_locked && is_there && Owner::Parse(ReadText(file).value_or("")).HasEnded()) ::unlink(file.c_str());
+  ::close(descriptor);
+}
+
 // A lock in `place` that excludes `own`, and whose process may be running; empty: none. Locks of one division into
 // shards do not exclude one another.
 Result<std::string> OtherLock(const std::string& place, const std::string& own) {
@@ -241,15 +260,7 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
                        "{}: process {} on host {} is baking there; wait for it, or remove {} if that process has ended",
                        place, owner.pid, owner.host, file);
     }
-    // Removes the lock that was read, but not one with which another process has replaced it meanwhile.
-    if (archive::IsBucket(file)) {
-      Remove(file);
-      continue;
-    }
-    const std::string stale = OwnPartial(file);
-    if (::rename(file.c_str(), stale.c_str()) != 0) continue;
-    if (ReadText(stale).value_or("") != *text) ::link(stale.c_str(), file.c_str());
-    ::unlink(stale.c_str());
+    RemoveStaleLock(file);
   }
   return MakeError(ErrorCode::kOverloaded, "{}: another bake has just begun there; wait for it", place);
 }
@@ -321,7 +332,7 @@ void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& fold
   }
   for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
     const fs::path file = fs::path(place) / name;
-    if (IsLock(name) && Owner::Parse(ReadText(file).value_or("")).HasEnded()) leftovers.push_back(file);
+    if (IsLock(name) && Owner::Parse(ReadText(file).value_or("")).HasEnded()) RemoveStaleLock(file.string());
   }
   for (const fs::path& file : leftovers) Remove(file);
 }
