@@ -168,12 +168,9 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
   application_.parts_.access_log.Write(record);
 }
 
-TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
-    : parts_(std::move(parts)),
-      config_at_start_(config),
-      request_time_limit_(config.request_deadline),
-      opening_(catalog == nullptr) {
-  state_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
+TerrainApplication::TerrainApplication(ApplicationParts parts, const config::Config& config)
+    : parts_(std::move(parts)), config_at_start_(config), request_time_limit_(config.request_deadline) {
+  state_ = Make(std::make_shared<const Catalog>(), config);
 }
 
 // Admission keeps the limit of locations and the proxies that were configured at the start. Replies must agree with it.

@@ -45,8 +45,8 @@ struct ApplicationParts {
 
 class TerrainApplication final : public Application, public ServerStatus {
  public:
-  // Without a catalog (null) requests wait for the first Replace, except those of rows with needs_no_catalog.
-  TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config);
+  // Requests wait for the first Replace, except those of rows with needs_no_catalog.
+  TerrainApplication(ApplicationParts parts, const config::Config& config);
 
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;
   std::string ClientOf(const asio::ip::address& peer) const override;
@@ -89,7 +89,7 @@ class TerrainApplication final : public Application, public ServerStatus {
   std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets
   const config::Config config_at_start_;
   std::atomic<std::chrono::milliseconds> request_time_limit_;
-  std::atomic<bool> opening_;  // the first catalog has not come
+  std::atomic<bool> opening_{true};  // the first catalog has not come
 };
 
 }  // namespace terrace::server

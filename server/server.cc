@@ -13,7 +13,6 @@
 #include <csignal>
 #include <functional>
 #include <mutex>
-#include <set>
 #include <thread>
 #include <utility>
 
@@ -44,29 +43,11 @@ std::string UrlOf(const Listener& listener, bool is_https) {
   return fmt::format("{}://{}:{}/", is_https ? "https" : "http", bare_v6 ? "[" + host + "]" : host, listener.port());
 }
 
-Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
-  std::set<std::string_view> names;
-  for (const DatasetView& dataset : datasets) {
-    if (dataset.name.empty()) return MakeError(ErrorCode::kInvalidArgument, "a dataset has no name; give it one");
-    if (Routes().IsReserved(dataset.name) || dataset.name.find('/') != std::string::npos) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "dataset \"{}\": this name is taken by a URL of the server or holds a '/'; choose another",
-                       dataset.name);
-    }
-    if (!names.insert(dataset.name).second) {
-      return MakeError(ErrorCode::kInvalidArgument, "dataset \"{}\": two datasets have this name; rename one",
-                       dataset.name);
-    }
-  }
-  return {};
-}
-
 // Members are destroyed from the last to the first: the io_contexts, whose unfinished coroutines hold sessions, go
 // before everything a session refers to.
 class RunningServer final : public Server {
  public:
-  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<ClientLimits> limits,
-                ServerOptions options)
+  RunningServer(StaticFiles viewer, AccessLog access_log, std::unique_ptr<ClientLimits> limits, ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
         limits_(std::move(limits)),
@@ -77,7 +58,7 @@ class RunningServer final : public Server {
         application_({*limits_, workers_, tiles_, document_flights_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_problem, options_.progress_of},
-                     std::move(catalog), options_.config),
+                     options_.config),
         admin_({workers_, tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
                 [this] { return application_.catalog(); }}),
         io_(options_.config.io_threads),
@@ -104,22 +85,20 @@ class RunningServer final : public Server {
     WatchSignals();
     // On an inherited socket, connections wait in its queue until there is something to serve: a stop before that loses
     // none.
-    if (!application_.opening() || options_.listen_socket < 0) listener_->Start();
+    if (options_.listen_socket < 0) listener_->Start();
     if (limits_->tls) asio::co_spawn(io_.first(), WatchCertificate(limits_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
   }
 
-  Result<void> Replace(CatalogPtr catalog, const config::Config& config) override {
-    if (Result<void> named = CheckNames(catalog->datasets); !named) return named;
+  void Replace(CatalogPtr catalog, const config::Config& config) override {
     tiles_.SetCacheBytes(config.cache_bytes);
     tiles_.AlsoRetainTilesOf(*catalog);
     const bool is_first = application_.Replace(catalog, config);
     if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
-    return {};
   }
 
   void SetProblems(std::map<std::string, std::string> problems) override {
@@ -349,9 +328,7 @@ Result<void> Server::CheckAddress(const config::Config& config) {
   return Listener::CheckAddress(config.listen.host, config.listen.port);
 }
 
-Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
-  const Result<void> named = catalog ? CheckNames(catalog->datasets) : Result<void>();
-  if (!named) return tl::unexpected(named.error());
+Result<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   const config::Config& config = options.config;
   Result<StaticFiles> viewer = StaticFiles::Load(config.viewer.directory);
   if (!viewer) return tl::unexpected(viewer.error());
@@ -359,8 +336,8 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (!access_log) return tl::unexpected(access_log.error());
   Result<std::unique_ptr<ClientLimits>> limits = ClientLimits::Open(config);
   if (!limits) return tl::unexpected(limits.error());
-  auto server = std::make_unique<RunningServer>(std::move(catalog), std::move(*viewer), std::move(*access_log),
-                                                *std::move(limits), std::move(options));
+  auto server = std::make_unique<RunningServer>(std::move(*viewer), std::move(*access_log), *std::move(limits),
+                                                std::move(options));
   if (const Result<void> started = server->Run(); !started) return tl::unexpected(started.error());
   return server;
 }

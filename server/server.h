@@ -45,13 +45,11 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Returns when the server is listening. Functions of the catalog's pipeline that block are called on workers;
-  // PlanArea and DatasetView::edits_hash on io threads. Without a catalog (null),
-  // requests wait for the first Replace, at most for request_deadline; /livez, /metrics and /readyz ("opening") answer
-  // meanwhile. kInvalidArgument: a dataset's name is empty, reserved, used twice or has a '/'; or a token, a trusted
-  // proxy, the certificate or its key cannot be used. kUnavailable: the server cannot listen on the address, read the
-  // viewer or write the access log. Messages name the remedy.
-  static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
+  // Returns when the server is listening. Requests wait for the first Replace, at most for request_deadline; /livez,
+  // /metrics and /readyz ("opening") answer meanwhile. kInvalidArgument: a trusted proxy, the certificate or its key
+  // cannot be used. kUnavailable: the server cannot listen on the address, read the viewer or write the access log.
+  // Messages name the remedy.
+  static Result<std::unique_ptr<Server>> Start(ServerOptions options);
 
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
   // errors. Call it before datasets are opened, which may take long.
@@ -62,9 +60,10 @@ class Server {
   // Answers new requests from `catalog`. Answers that have begun keep their catalog; a request whose source was
   // replaced, or whose reply waits for memory, is answered anew from the current one. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control, max_mesh_samples and
-  // request_deadline of `config`. Datasets that are pending answer 503. kInvalidArgument: a name is not valid, as in
-  // Start; nothing changes. May be called on any thread, but not concurrently.
-  virtual Result<void> Replace(CatalogPtr catalog, const config::Config& config) = 0;
+  // request_deadline of `config`. Datasets that are pending answer 503. Names of datasets are valid (CheckDatasetName)
+  // and differ. Functions of the catalog's pipeline that block are called on workers; PlanArea and
+  // DatasetView::edits_hash on io threads. May be called on any thread, but not concurrently.
+  virtual void Replace(CatalogPtr catalog, const config::Config& config) = 0;
 
   // Requests a stop and waits for it.
   virtual ~Server() = default;

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "config/config.h"
-#include "engine/core/result.h"
 #include "server/access/client_address.h"
 #include "server/access/rate_limiter.h"
 #include "server/api/request_context.h"
@@ -25,10 +24,10 @@ namespace terrace::server {
 // Immutable. Tokens are stored and compared as hashes, so that the time of a comparison reveals nothing about a token.
 class AccessPolicy {
  public:
-  // Without tokens every dataset is public. With tokens only `public_datasets` are. kInvalidArgument: a text is not a
-  // hash, or a token occurs twice.
-  static Result<AccessPolicy> Make(const std::vector<config::TokenConfig>& tokens,
-                                   const std::vector<std::string>& public_datasets);
+  // Without tokens every dataset is public. With tokens only `public_datasets` are. Two tokens must not have the same
+  // hash.
+  static AccessPolicy Make(const std::vector<config::TokenConfig>& tokens,
+                           const std::vector<std::string>& public_datasets);
 
   bool has_tokens() const { return !grants_.empty(); }
 

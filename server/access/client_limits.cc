@@ -24,9 +24,7 @@ Result<std::unique_ptr<ClientLimits>> ClientLimits::Open(const config::Config& c
   for (const config::DatasetConfig& dataset : config.datasets) {
     if (dataset.is_public) public_datasets.push_back(dataset.name);
   }
-  Result<AccessPolicy> access = AccessPolicy::Make(config.tokens, public_datasets);
-  if (!access) return tl::unexpected(std::move(access.error()));
-  admission.access = *std::move(access);
+  admission.access = AccessPolicy::Make(config.tokens, public_datasets);
   admission.rate.per_second = config.requests_per_second;
   admission.rate.burst = config.request_burst > 0 ? config.request_burst : 2 * config.requests_per_second;
 

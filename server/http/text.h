@@ -20,7 +20,6 @@ namespace terrace::server {
 // Removes `blanks` from both ends.
 std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
 
-std::string Lower(std::string_view text);
 bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 
 // Returns the text after "http://" or "https://", in upper or lower case; nothing if the text begins with neither.

@@ -33,7 +33,7 @@ TEST_F(Opening, AnswersProbesAndMetricsAndLetsOthersWait) {
   EXPECT_EQ(probe.body, "opening\n");
   EXPECT_NE(probe.Field("retry-after"), "");
 
-  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  server_->Replace(MakeCatalog(), {});
   const auto reply = tile.Read(), list = documents.Read();
   ASSERT_TRUE(reply && list);
   EXPECT_EQ(reply->status, 200);
@@ -84,7 +84,7 @@ class Pending : public ServerFixture {
 
 TEST_F(Pending, DatasetsAreToldWhileOthersAreServed) {
   Listen(WithShares());
-  ASSERT_TRUE(server_->Replace(WithPending(MakeCatalog()->datasets), {}));
+  server_->Replace(WithPending(MakeCatalog()->datasets), {});
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain").status, 200);
   for (const char* target :
        {"/alps/0/0/0.terrain", "/alps/layer.json", "/alps/tileset.json", "/alps/heights?locations=1,1"}) {
@@ -117,7 +117,7 @@ TEST_F(Pending, DatasetsAreToldWhileOthersAreServed) {
   EXPECT_NE(failed.body.find("cannot be opened"), std::string::npos);
   EXPECT_EQ(failed.body.find("secret"), std::string::npos);
 
-  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  server_->Replace(MakeCatalog(), {});
   server_->SetProblems({});
   EXPECT_EQ(Fetch(port(), "/readyz").body, "ready\n");
   EXPECT_EQ(Fetch(port(), "/datasets").body.find("preparing"), std::string::npos);
@@ -126,7 +126,7 @@ TEST_F(Pending, DatasetsAreToldWhileOthersAreServed) {
 
 TEST_F(Pending, AServerWithoutAnythingElseIsNotReady) {
   Listen(WithShares());
-  ASSERT_TRUE(server_->Replace(WithPending({}), {}));
+  server_->Replace(WithPending({}), {});
   const Reply ready = Fetch(port(), "/readyz");
   EXPECT_EQ(ready.status, 503);
   EXPECT_EQ(ready.Field("retry-after"), "5");
@@ -143,7 +143,7 @@ TEST_F(Pending, DatasetsAreHiddenFromTokensThatMayNotSeeThem) {
   options.config.datasets = {PublicDataset("maui"), PublicDataset("andes")};
   options.config.tokens = {{"everybody", config::TokenHash("secret-of-all"), {}, 0}};
   Listen(options);
-  ASSERT_TRUE(server_->Replace(WithPending(MakeCatalog()->datasets), options.config));
+  server_->Replace(WithPending(MakeCatalog()->datasets), options.config);
   const Reply list = Fetch(port(), "/datasets");
   EXPECT_NE(list.body.find(R"("preparing":[{"name":"andes","percent":0}])"), std::string::npos) << list.body;
   EXPECT_EQ(list.body.find("alps"), std::string::npos);
@@ -221,7 +221,7 @@ TEST_F(HeldSocket, IsNotAcceptedFromBeforeThereIsSomethingToServe) {
   EXPECT_TRUE(server_->Wait());
   server_.reset();
   Listen(OnIt());
-  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  server_->Replace(MakeCatalog(), {});
   const auto reply = early.Read();
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status, 200);

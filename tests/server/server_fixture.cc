@@ -32,8 +32,7 @@ ServerFixture::ServerFixture() {
 void ServerFixture::Start(ServerOptions options) {
   Listen(options);
   ASSERT_TRUE(server_);
-  const Result<void> served = server_->Replace(MakeCatalog(), options.config);
-  ASSERT_TRUE(served) << served.error().message;
+  server_->Replace(MakeCatalog(), options.config);
 }
 
 void ServerFixture::Listen(ServerOptions options) {
@@ -41,7 +40,7 @@ void ServerFixture::Listen(ServerOptions options) {
   options.config.io_threads = 2;
   options.metrics_age = std::chrono::milliseconds(0);  // tests read metrics of their latest request
   if (options.config.worker_threads == 0) options.config.worker_threads = 2;
-  auto server = Server::Start(nullptr, options);
+  auto server = Server::Start(options);
   ASSERT_TRUE(server) << server.error().message;
   server_ = std::move(*server);
 }

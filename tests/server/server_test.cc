@@ -471,20 +471,10 @@ TEST_F(ServerTest, SaysWhatToDoAboutATakenPort) {
   Start();
   ServerOptions options;
   options.config.listen.port = port();
-  const auto second = Server::Start(std::make_shared<const Catalog>(), options);
+  const auto second = Server::Start(options);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("127.0.0.1:" + std::to_string(port())), std::string::npos);
   EXPECT_NE(second.error().message.find("choose another port"), std::string::npos);
-}
-
-TEST_F(ServerTest, RefusesNamesThatItsUrlsNeed) {
-  DatasetView dataset;
-  for (const char* name : {"metrics", "viewer", "", "a/b"}) {
-    dataset.name = name;
-    EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset}, nullptr}), {})) << name;
-  }
-  dataset.name = "maui";
-  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset, dataset}, nullptr}), {}));
 }
 
 }  // namespace

@@ -159,12 +159,12 @@ TEST_F(Tls, SaysWhichFileIsWrong) {
   ServerOptions options;
   options.config.tls.certificate = certificate_;
   options.config.tls.key = directory_ + "/other.key";
-  const auto mismatched = Server::Start(std::make_shared<const Catalog>(), options);
+  const auto mismatched = Server::Start(options);
   ASSERT_FALSE(mismatched);
   EXPECT_EQ(mismatched.error().message,
             directory_ + "/other.key: is not the key of the certificate in " + certificate_);
   options.config.tls.certificate = key_;
-  const auto swapped = Server::Start(std::make_shared<const Catalog>(), options);
+  const auto swapped = Server::Start(options);
   ASSERT_FALSE(swapped);
   EXPECT_NE(swapped.error().message.find("server.key"), std::string::npos) << swapped.error().message;
 }

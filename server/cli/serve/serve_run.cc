@@ -93,7 +93,7 @@ Result<void> ServeRun::Start(server::ServerOptions options, std::size_t store_fi
   options.cache_problem = [folder = cache_.folder] { return folder ? folder->problem() : std::string(); };
   options.progress_of = [shares = shares_](const std::string& dataset) { return shares->Of(dataset); };
   HandleEvents(options);
-  auto started = server::Server::Start(nullptr, std::move(options));
+  auto started = server::Server::Start(std::move(options));
   if (!started) return tl::unexpected(started.error());
   server_ = *std::move(started);
   NotifyOpening();
@@ -143,9 +143,7 @@ int ServeRun::ServeDatasets() {
   is_announced_ = first->pending.empty();
   has_served_nothing_ = first->open.empty();
   reloader_ = std::make_unique<server::Reloader>(config_, std::move(first->slots), MakeHooks());
-  if (const Result<void> served = server_->Replace(CatalogOf(first->open, first->pending), config_); !served) {
-    return FailToStart(served.error());
-  }
+  server_->Replace(CatalogOf(first->open, first->pending), config_);
   first->open.clear();  // replaced files must not stay open
   shares_->GoToBackground();
   if (is_announced_) {
@@ -216,12 +214,9 @@ void ServeRun::Publish(const std::vector<tiler::Dataset>& served, const config::
   // The tiers know the new datasets before requests for them come, and forget the old ones afterwards.
   baked_->AlsoUse(served);
   refinements_->AlsoRetain(generations);
-  if (const Result<void> replaced = server_->Replace(CatalogOf(served, pending), now); !replaced) {
-    spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
-  } else {
-    count_ = served.size();
-    pending_ = pending.size();
-  }
+  server_->Replace(CatalogOf(served, pending), now);
+  count_ = served.size();
+  pending_ = pending.size();
   has_served_nothing_ = false;
   baked_->Use(served);
   refinements_->Retain(generations);

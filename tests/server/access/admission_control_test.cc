@@ -13,7 +13,7 @@ namespace {
 AdmissionControl AdmissionControlWith(const std::vector<config::TokenConfig>& tokens,
                                       const std::vector<std::string>& open = {}) {
   AdmissionOptions options;
-  options.access = *AccessPolicy::Make(tokens, open);
+  options.access = AccessPolicy::Make(tokens, open);
   return AdmissionControl(std::move(options));
 }
 
@@ -138,7 +138,7 @@ TEST(AdmissionControl, KnowsWhichRepliesDependOnTheGrant) {
 
 TEST(AdmissionControl, CountsAllButProbes) {
   AdmissionOptions options;
-  options.access = *AccessPolicy::Make({}, {});
+  options.access = AccessPolicy::Make({}, {});
   options.rate.per_second = 1;
   options.rate.burst = 1;
   AdmissionControl admission_control(std::move(options));
