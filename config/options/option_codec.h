@@ -179,6 +179,38 @@ Codec<Target> Path(std::string Target::*member, const char* what) {
           Json::parse(kNonEmptyText)};
 }
 
+// A list of texts. `is_path`: the texts are paths, relative to the folder of the file. As a flag: texts separated by
+// commas.
+template <typename Target>
+Codec<Target> TextList(std::vector<std::string> Target::*member, const char* expected, bool is_path) {
+  Json text_schema = Json::parse(kNonEmptyText);
+  text_schema["pattern"] = kOneLinePattern;
+  Json schema = {{"anyOf", Json::array({text_schema, ListOf(text_schema)})}};
+  return {[=](const Json& value, const ConfigLocation& place, Target& config) {
+            std::vector<std::string> texts;
+            for (const Json& item : value.is_array() ? value : Json::array({value})) {
+              if (!item.is_string() || item.get_ref<const std::string&>().empty() ||
+                  HasControlCharacter(item.get<std::string>())) {
+                return place.Expected(expected);
+              }
+              const auto text = item.get<std::string>();
+              texts.push_back(is_path ? place.Resolve(text) : text);
+            }
+            config.*member = std::move(texts);
+          },
+          [=](const Target& config) { return (config.*member).empty() ? Json() : Json(config.*member); },
+          [](const std::string& text) {
+            Json list = Json::array();
+            for (std::size_t start = 0; start <= text.size();) {
+              const std::size_t comma = std::min(text.find(',', start), text.size());
+              list.push_back(text.substr(start, comma - start));
+              start = comma + 1;
+            }
+            return list;
+          },
+          std::move(schema)};
+}
+
 template <typename Target>
 Codec<Target> OneLine(std::string Target::*member) {
   return Text(member, CheckOneLine, TextLike(kOneLinePattern));

@@ -3,9 +3,13 @@
 // generated from them; a new option is one row (CONTRIBUTING.md). For the modules of config/ only.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "config/config.h"
@@ -52,19 +56,73 @@ std::string DefaultOf(const Option<Target>& option) {
   return value == "null" || value == "\"\"" || value == "[]" ? "" : value;
 }
 
+// unknown_key.cc
+// Returns a sentence for the error at the key. `known`: the keys of its object. If another kind of object has the key,
+// the sentence says where it belongs; else it names similar keys. Empty: the key resembles no known one, and no message
+// may quote it.
+std::string ExplainKey(std::string_view key, std::span<const KnownName> known);
+
 // Reads every key of `object` by the table. Missing required keys and unknown keys are errors. Unknown keys are
 // reported by their position, and by name only if they resemble a known key of this or another object.
 template <typename Target>
 void ReadObject(const Json& object, const ConfigLocation& place, const std::vector<Option<Target>>& table,
-                Target& target);
+                Target& target) {
+  if (!object.is_object())
+    return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"");
+  std::vector<std::string_view> keys;
+  keys.reserve(table.size());
+  for (const Option<Target>& option : table) keys.push_back(option.key);
+  std::size_t number = 0;
+  for (const auto& [key, value] : object.items()) {
+    ++number;
+    const auto found = std::find(keys.begin(), keys.end(), key);
+    if (found != keys.end()) {
+      table[static_cast<std::size_t>(found - keys.begin())].codec.read(value, place.At(key), target);
+      continue;
+    }
+    if (const std::string problem = ExplainKey(key, KnownNames(table)); problem.empty()) {
+      place.Fail(fmt::format("key {} of this object is unknown; known are {}", number, fmt::join(keys, ", ")));
+    } else {
+      place.At(key).Fail(problem);
+    }
+  }
+  for (const Option<Target>& option : table) {
+    if (option.missing.empty() || object.contains(option.key)) continue;
+    if (!option.unless.empty() && object.contains(option.unless)) continue;
+    place.Fail(fmt::format("\"{}\" is missing{}", option.key, option.missing));
+  }
+}
 
 // Writes every option that has a value, in the order of the table.
 template <typename Target>
-Json WriteObject(const Target& source, const std::vector<Option<Target>>& table);
+Json WriteObject(const Target& source, const std::vector<Option<Target>>& table) {
+  Json object = Json::object();
+  for (const Option<Target>& option : table) {
+    Json value = option.codec.write(source);
+    if (!value.is_null()) object[std::string(option.key)] = std::move(value);
+  }
+  return object;
+}
 
 // Returns the JSON Schema of the object.
 template <typename Target>
-Json ObjectSchema(const std::vector<Option<Target>>& table);
+Json ObjectSchema(const std::vector<Option<Target>>& table) {
+  Json required = Json::array(), any = Json::array(), properties = Json::object();
+  for (const Option<Target>& option : table) {
+    if (!option.missing.empty() && option.unless.empty()) required.push_back(option.key);
+    if (!option.unless.empty()) {
+      for (const std::string_view key : {option.key, option.unless}) any.push_back({{"required", Json::array({key})}});
+    }
+    Json& property = properties[std::string(option.key)] = {{"description", option.help}};
+    property.update(option.codec.schema);
+    if (const std::string value = DefaultOf(option); !value.empty()) property["default"] = Json::parse(value);
+  }
+  Json schema = {{"type", "object"}, {"additionalProperties", false}};
+  if (!required.empty()) schema["required"] = std::move(required);
+  if (!any.empty()) schema["anyOf"] = std::move(any);
+  schema["properties"] = std::move(properties);
+  return schema;
+}
 
 // An object with the options of `table`, which outlives the codec; its flag sets only the first option,
 // the object's member `first`. While `first` is empty, the object counts as not set. `example`: for the error that the
@@ -89,12 +147,6 @@ Codec<Target> ObjectOf(Object Target::*member, std::string Object::*first, const
 // First path segments of the server's own URLs.
 std::span<const std::string_view> ReservedDatasetNames();
 
-// unknown_key.cc
-// Returns a sentence for the error at the key. `known`: the keys of its object. If another kind of object has the key,
-// the sentence says where it belongs; else it names similar keys. Empty: the key resembles no known one, and no message
-// may quote it.
-std::string ExplainKey(std::string_view key, std::span<const KnownName> known);
-
 // source_options.cc
 // ["dem.tif", {"path": "other.tif", "vertical": "egm96"}]
 Codec<DatasetConfig> SourcesCodec();
@@ -107,11 +159,6 @@ Codec<DatasetConfig> VerticalCodec();
 
 // "auto", "declared", a number or a list of numbers.
 Codec<DatasetConfig> NodataCodec();
-
-// A list of texts. `is_path`: the texts are paths, relative to the folder of the file. As a flag: texts separated by
-// commas.
-template <typename Target>
-Codec<Target> TextList(std::vector<std::string> Target::*member, const char* expected, bool is_path);
 
 // water_imagery_options.cc
 // {"mask": "water.tif"} or {"sea_level": 0}. As a flag: a number is a sea level, any other text the path of a mask.
