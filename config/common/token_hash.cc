@@ -1,5 +1,6 @@
 #include "config/common/token_hash.h"
 
+#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -13,13 +14,7 @@ std::string TokenHash(std::string_view token) {
   unsigned size = 0;
   static const EVP_MD* const kAlgorithm = ::EVP_sha256();
   TERRACE_CHECK(::EVP_Digest(token.data(), token.size(), hash.data(), &size, kAlgorithm, nullptr) == 1);
-  std::string digits;
-  digits.reserve(2 * std::size_t{size});
-  for (unsigned i = 0; i < size; ++i) {
-    digits += "0123456789abcdef"[hash[i] >> 4];
-    digits += "0123456789abcdef"[hash[i] & 15];
-  }
-  return digits;
+  return fmt::format("{:02x}", fmt::join(hash.begin(), hash.begin() + size, ""));
 }
 
 }  // namespace terrace::config

@@ -57,7 +57,7 @@ ConfigResult ParseConfig(std::string_view text, const std::filesystem::path& dir
   if (root.is_discarded()) return tl::unexpected(std::move(errors));
   if (root.is_object()) root.erase(kSchemaKey);
   Config config;
-  ReadObject(root, ConfigLocation(directory, "", errors), ServerOptionTable(), config);
+  ReadObject(root, ConfigLocation(directory, errors), ServerOptionTable(), config);
   const std::vector<ConfigError> duplicates = FindDuplicateNames(config.datasets);
   errors.insert(errors.end(), duplicates.begin(), duplicates.end());
   if (!errors.empty()) return tl::unexpected(std::move(errors));

@@ -18,24 +18,24 @@ namespace terrace::config {
 class ConfigLocation {
  public:
   // `errors` must outlive this and every location made from it.
-  ConfigLocation(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
-      : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
+  ConfigLocation(std::filesystem::path directory, std::vector<ConfigError>& errors)
+      : directory_(std::move(directory)), errors_(&errors) {}
   // The command line. Empty directory: the working directory has no name.
   static ConfigLocation InWorkingDirectory(std::filesystem::path directory, std::vector<ConfigError>& errors) {
-    ConfigLocation place(std::move(directory), "", errors);
+    ConfigLocation place(std::move(directory), errors);
     place.is_command_line_ = true;
     return place;
   }
 
   ConfigLocation At(std::string_view key) const {
     ConfigLocation place = *this;
-    place.path_ = AppendKey(path_, key);
+    place.path_ /= std::string(key);
     return place;
   }
   ConfigLocation At(std::size_t index) const { return At(std::to_string(index)); }
 
   void Fail(std::string message) const {
-    if (!has_failed_often()) errors_->push_back({path_, std::move(message)});
+    if (!has_failed_often()) errors_->push_back({path_.to_string(), std::move(message)});
   }
   bool has_failed_often() const { return errors_->size() >= kMaxConfigErrors; }
   void Expected(std::string_view what) const { Fail("must be " + std::string(what)); }
@@ -53,7 +53,7 @@ class ConfigLocation {
 
  private:
   std::filesystem::path directory_;
-  std::string path_;
+  Json::json_pointer path_;
   std::vector<ConfigError>* errors_;
   bool is_command_line_ = false;
 };

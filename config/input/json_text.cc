@@ -178,18 +178,4 @@ Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors) {
   return Json(Json::value_t::discarded);
 }
 
-std::string AppendKey(const std::string& path, std::string_view key) {
-  std::string result = path + '/';
-  for (const char c : key) {
-    if (c == '~') {
-      result += "~0";
-    } else if (c == '/') {
-      result += "~1";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
-
 }  // namespace terrace::config

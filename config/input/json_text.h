@@ -22,7 +22,4 @@ inline constexpr std::size_t kMaxConfigErrors = 100;
 // Returns the value and appends errors. After a syntax error (path "") the value is discarded (Json::is_discarded).
 Json ParseJsonText(std::string_view text, std::vector<ConfigError>& errors);
 
-// `path` + "/" + `key`, escaped after RFC 6901.
-std::string AppendKey(const std::string& path, std::string_view key);
-
 }  // namespace terrace::config

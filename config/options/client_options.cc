@@ -87,12 +87,8 @@ Json ListToJson(const std::string& text) {
     const Json parsed = Json::parse(text, nullptr, /*allow_exceptions=*/false);
     if (parsed.is_array()) return parsed;
   }
-  Json list = Json::array();
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    list.push_back(text.substr(at, comma - at));
-    at = comma + 1;
-  }
+  Json list = TextsToJson(text);
+  if (list.back() == "") list.erase(list.size() - 1);  // an empty text is the empty list
   return list;
 }
 

@@ -38,6 +38,16 @@ Json SwitchToJson(const std::string& text) {
   return text;
 }
 
+Json TextsToJson(const std::string& text) {
+  Json list = Json::array();
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', start), text.size());
+    list.push_back(text.substr(start, comma - start));
+    start = comma + 1;
+  }
+  return list;
+}
+
 bool HasControlCharacter(const std::string& text) {
   return std::any_of(text.begin(), text.end(),
                      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });

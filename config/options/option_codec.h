@@ -35,6 +35,9 @@ Json NumberToJson(const std::string& text);
 // Converts "true" and "false" to booleans; other text stays text.
 Json SwitchToJson(const std::string& text);
 
+// Converts texts separated by commas to a list; an empty text is one empty part.
+Json TextsToJson(const std::string& text);
+
 // Schemas.
 inline constexpr const char* kNonEmptyText = R"({"type": "string", "minLength": 1})";
 inline constexpr const char* kOneLinePattern = R"(^[^\u0000-\u001f\u007f]*$)";
@@ -198,16 +201,7 @@ Codec<Target> TextList(std::vector<std::string> Target::*member, const char* exp
             }
             config.*member = std::move(texts);
           },
-          [=](const Target& config) { return (config.*member).empty() ? Json() : Json(config.*member); },
-          [](const std::string& text) {
-            Json list = Json::array();
-            for (std::size_t start = 0; start <= text.size();) {
-              const std::size_t comma = std::min(text.find(',', start), text.size());
-              list.push_back(text.substr(start, comma - start));
-              start = comma + 1;
-            }
-            return list;
-          },
+          [=](const Target& config) { return (config.*member).empty() ? Json() : Json(config.*member); }, TextsToJson,
           std::move(schema)};
 }
 

@@ -85,20 +85,28 @@ constexpr const char* kNodataSchema = R"({
   "anyOf": [{"enum": ["auto", "declared"]}, {"type": "number"}, {"type": "array", "items": {"type": "number"}}]
 })";
 
-Codec<SourceConfig> SourceVertical() {
-  return {[](const Json& value, const ConfigLocation& place, SourceConfig& source) {
-            source.vertical = ReadVertical(value, place);
+template <typename Target, typename Member>
+Codec<Target> Vertical(Member Target::*member) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
+            if (auto vertical = ReadVertical(value, place)) target.*member = *std::move(vertical);
           },
-          [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }, nullptr,
-          Json::parse(kVerticalSchema)};
+          [=](const Target& target) {
+            const std::optional<std::string> vertical = target.*member;
+            return vertical ? Json(*vertical) : Json();
+          },
+          TextToJson, Json::parse(kVerticalSchema)};
 }
 
-Codec<SourceConfig> SourceNodata() {
-  return {[](const Json& value, const ConfigLocation& place, SourceConfig& source) {
-            source.nodata = ReadNodata(value, place);
+template <typename Target, typename Member>
+Codec<Target> Nodata(Member Target::*member) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
+            if (auto nodata = ReadNodata(value, place)) target.*member = *std::move(nodata);
           },
-          [](const SourceConfig& source) { return source.nodata ? WriteNodata(*source.nodata) : Json(); }, nullptr,
-          Json::parse(kNodataSchema)};
+          [=](const Target& target) {
+            const std::optional<NodataConfig> nodata = target.*member;
+            return nodata ? WriteNodata(*nodata) : Json();
+          },
+          NumberToJson, Json::parse(kNodataSchema)};
 }
 
 void ReadSource(const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
@@ -138,11 +146,11 @@ const std::vector<Option<SourceConfig>>& SourceOptionTable() {
       {.key = "vertical",
        .value = "DATUM",
        .help = "Vertical datum of these files; by default the dataset's",
-       .codec = SourceVertical()},
+       .codec = Vertical(&SourceConfig::vertical)},
       {.key = "nodata",
        .value = "VALUE",
        .help = "Which samples of these files are voids; by default as for the dataset",
-       .codec = SourceNodata()},
+       .codec = Nodata(&SourceConfig::nodata)},
   };
   return table;
 }
@@ -166,20 +174,7 @@ Codec<DatasetConfig> SourcesCodec() {
           nullptr, SourcesSchema()};
 }
 
-Codec<DatasetConfig> VerticalCodec() {
-  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
-            if (auto vertical = ReadVertical(value, place)) dataset.vertical = *std::move(vertical);
-          },
-          [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson,
-          Json::parse(kVerticalSchema)};
-}
-
-Codec<DatasetConfig> NodataCodec() {
-  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
-            if (auto nodata = ReadNodata(value, place)) dataset.nodata = *std::move(nodata);
-          },
-          [](const DatasetConfig& dataset) { return WriteNodata(dataset.nodata); }, NumberToJson,
-          Json::parse(kNodataSchema)};
-}
+Codec<DatasetConfig> VerticalCodec() { return Vertical(&DatasetConfig::vertical); }
+Codec<DatasetConfig> NodataCodec() { return Nodata(&DatasetConfig::nodata); }
 
 }  // namespace terrace::config
