@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/core/names.h"
+#include "engine/core/nearest_name.h"
 #include "engine/core/result.h"
 
 namespace terrace::server {
@@ -83,11 +84,9 @@ Result<void> SetOneOf(T& to, std::string_view name, std::string_view text, const
     to = *meaning;
     return {};
   }
-  std::string allowed;
-  for (const auto& [word, meaning] : words) {
-    allowed.append(allowed.empty() ? "" : word == words.back().first ? " or " : ", ").append(word);
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "{} must be {}", name, allowed);
+  std::vector<std::string> allowed;
+  for (const auto& [word, meaning] : words) allowed.emplace_back(word);
+  return MakeError(ErrorCode::kInvalidArgument, "{} must be {}", name, Alternatives(allowed));
 }
 template <typename T, std::size_t kCount>
 Result<void> SetOneOf(T& to, std::string_view name, std::string_view text,

@@ -1,8 +1,5 @@
 // terrace bake: builds all tiles of a dataset ahead of requests.
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,7 +9,7 @@
 #include "server/cli/bake/bake_run.h"
 #include "server/cli/bake/bake_status.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/number_check.h"
+#include "server/cli/common/option_checks.h"
 #include "server/cli/common/option_flags.h"
 
 namespace terrace::cli {
@@ -21,23 +18,6 @@ namespace {
 constexpr const char* kWhat = "What is baked";
 constexpr const char* kHow = "How it is baked";
 constexpr const char* kPlanning = "Planning";
-
-CLI::Validator NumberAbove0(const std::string& what) {
-  const auto check = [=](const std::string& text) {
-    double number = 0;
-    const bool valid = CLI::detail::lexical_cast(text, number) && number > 0 && number <= 1e9;
-    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", what, text);
-  };
-  return CLI::Validator(check, "");
-}
-
-CLI::Validator OneForm() {
-  const auto check = [](const std::string& text) {
-    const bool valid = text == kChunks || text == kFolder || text == kSingle || text == k3tz;
-    return valid ? std::string() : fmt::format("must be chunks, folder, single or 3tz, not \"{}\"", text);
-  };
-  return CLI::Validator(check, "");
-}
 
 void AddWhat(CLI::App& command, BakeArguments& arguments) {
   command.add_option("DEM", arguments.dems,
@@ -62,7 +42,7 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
           "--form", arguments.form,
           "chunks: files of a few thousand tiles, for terrace serve and updates; folder: one file for each tile, for "
           "static hosts; single: one PMTiles file; 3tz: one file of 3D Tiles")
-      ->check(OneForm())
+      ->check(OneOf({kChunks, kFolder, kSingle, k3tz}))
       ->type_name("chunks|folder|single|3tz")
       ->capture_default_str()
       ->group(kWhat);

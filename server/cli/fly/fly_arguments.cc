@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "server/cli/common/number_check.h"
+#include "server/cli/common/option_checks.h"
 
 namespace terrace::cli {
 namespace {

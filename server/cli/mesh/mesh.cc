@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -34,7 +33,7 @@
 #include "engine/tin/mesh_error.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/number_check.h"
+#include "server/cli/common/option_checks.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_area.h"
 #include "server/cli/mesh/mesh_color.h"
@@ -205,17 +204,7 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
       PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
-std::function<std::string(const std::string&)> Metres() {
-  return NumberFrom<double>(0, 1e6, "a number of metres from 0 to 1000000");
-}
-
-CLI::Validator OneOf(const std::vector<std::string>& words) {
-  const auto check = [=](const std::string& text) {
-    const bool valid = std::find(words.begin(), words.end(), text) != words.end();
-    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", fmt::join(words, " or "), text);
-  };
-  return CLI::Validator(check, "");
-}
+OptionCheck Metres() { return NumberFrom<double>(0, 1e6, "a number of metres from 0 to 1000000"); }
 
 int Mesh(const MeshArguments& arguments) {
   spdlog::set_level(spdlog::level::err);

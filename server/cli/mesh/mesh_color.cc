@@ -20,7 +20,7 @@
 #include "engine/tin/extended/extended_field.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/number_check.h"
+#include "server/cli/common/option_checks.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"

@@ -343,7 +343,7 @@ class Mesh(InFolder):
                                  (["--max-error", "metres"], ["--out", out, "--max-error", "nan"]),
                                  (["--max-error", "metres"], ["--out", out, "--max-error", -1]),
                                  (["--threads", "1 to 256"], ["--out", out, "--points", 9, "--threads", 0]),
-                                 (["pixel or crs"], ["--out", out, "--points", 9, "--coordinates", "polar"]),
+                                 (["pixel, crs, enu, ecef or geographic"], ["--out", out, "--points", 9, "--coordinates", "polar"]),
                                  (["--compact", "--max-error"], ["--out", out, "--points", 9, "--compact"]),
                                  (["--compact", "--max-error"], ["--out", out, "--rms", 9, "--compact"]),
                                  (["delaunay or data-dependent"], ["--out", out, "--points", 9, "--criterion", "best"]),
@@ -353,7 +353,7 @@ class Mesh(InFolder):
                                   ["--out", out, "--points", 9, "--measure", "max-max"]),
                                  (["from 0 to 1"],
                                   ["--out", out, "--points", 9, "--criterion", "data-dependent", "--qthresh", 2]),
-                                 (["sum-max or sum-squares or max-max or normals"],
+                                 (["sum-max, sum-squares, max-max or normals"],
                                   ["--out", out, "--points", 9, "--criterion", "data-dependent", "--measure", "mean"]),
                                  ([".obj", ".ply", ".glb"], ["--out", "a.txt", "--points", 9])):
             self.assert_refused(2, words, "mesh", SAMPLE, *arguments)
