@@ -1,7 +1,6 @@
 // terrace mesh: one TIN of a whole raster, to a file.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -144,25 +143,6 @@ tin::GreedyOptions OptionsOf(const MeshArguments& arguments) {
   return options;
 }
 
-// Runs towards the goal in steps, so that progress can be shown. The error decreases roughly as 1 / vertices.
-void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangulation& greedy) {
-  Progress progress("meshing");
-  const std::size_t step = std::max<std::size_t>(10'000, samples / 200);
-  for (;;) {
-    tin::GreedyGoal part = goal;
-    part.max_points = std::min(goal.max_points, greedy.vertex_count() + step);
-    const std::size_t before = greedy.vertex_count();
-    greedy.Run(part);
-    if (greedy.vertex_count() < part.max_points || part.max_points == goal.max_points ||
-        greedy.vertex_count() == before)
-      return;
-    const double share = goal.max_points < samples
-                             ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
-                             : std::min(1.0, goal.max_error / greedy.CurrentError());
-    progress.Update(share);
-  }
-}
-
 // Only an error goal applies to each block separately; the other goals apply to the whole raster.
 tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField& field) {
   if (arguments.max_error >= 0) {
@@ -174,14 +154,13 @@ tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField&
   if (arguments.points > 0) goal.max_points = arguments.points;
   if (arguments.rms >= 0) goal.rms_error = arguments.rms;
   tin::GreedyTriangulation greedy(field, OptionsOf(arguments));
-  RunTo(goal, static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height()), greedy);
+  const std::size_t samples = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
+  RunInSteps(goal, std::max<std::size_t>(10'000, samples / 200), greedy);
   return greedy.Mesh();
 }
 
 void Print(const MeshArguments& arguments, const tin::HeightField& field, const tin::TinMesh& mesh,
            const tin::MeshError& error, const MeshSeconds& seconds) {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
   const std::size_t voids = VoidsOf(field, error.samples);
   if (arguments.json) {
     const nlohmann::ordered_json statistics = {
@@ -193,7 +172,7 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
         {"max_error", error.max},
         {"rms_error", error.rms},
         {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
-        {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+        {"peak_rss_bytes", PeakRssBytes()}};
     fmt::print("{}\n", statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }

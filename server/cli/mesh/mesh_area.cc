@@ -1,7 +1,6 @@
 #include "server/cli/mesh/mesh_area.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -84,8 +83,6 @@ void Print(const AreaMeshArguments& arguments, const dem::ElevationModel& model,
   const double longitude = plan.centre.longitude > 180 ? plan.centre.longitude - 360 : plan.centre.longitude;
   const std::array<double, 2> origin = {plan.centre.latitude, longitude};
   if (arguments.json) {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
     nlohmann::ordered_json statistics = {
         {"input", {{"path", arguments.dem}, {"width", plan.window.columns}, {"height", plan.window.rows}}},
         {"edits", model.info().edits},
@@ -96,7 +93,7 @@ void Print(const AreaMeshArguments& arguments, const dem::ElevationModel& model,
         {"triangles", mesh.triangles},
         {"max_error", mesh.max_error_m},
         {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
-        {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+        {"peak_rss_bytes", PeakRssBytes()}};
     if (is_local) statistics["origin"] = origin;
     fmt::print("{}\n", statistics.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;

@@ -1,10 +1,8 @@
 #include "server/cli/mesh/mesh_color.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -79,27 +77,9 @@ Result<Placement> PlacementFor(const ColoredMeshArguments& arguments, const Sour
   return Placement{0.5, {-0.5, 1, 0, source.field.heights().height() - 0.5, 0, -1}};
 }
 
-// Runs in steps, so that progress can be shown. The error decreases roughly as 1 / vertices.
-tin::ColoredMesh Triangulate(const tin::ExtendedField& field, const tin::ExtendedGoal& goal) {
-  constexpr std::size_t kStep = 10'000, kNoLimit = tin::ExtendedGoal{}.max_points;
-  Progress progress("meshing");
-  tin::ExtendedGreedy greedy(field);
-  tin::ExtendedGoal part = goal;
-  do {
-    part.max_points = std::min(goal.max_points, greedy.vertex_count() + kStep);
-    greedy.Run(part);
-    progress.Update(goal.max_points != kNoLimit
-                        ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
-                        : std::min(1.0, goal.max_error / greedy.CurrentError()));
-  } while (greedy.vertex_count() == part.max_points && part.max_points != goal.max_points);
-  return greedy.Mesh();
-}
-
 nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const tin::ExtendedField& field,
                                   const tin::ColoredMesh& mesh, const tin::ExtendedError& error,
                                   const MeshSeconds& seconds) {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
   const bool is_image = arguments.color.is_image;
   return {{"input",
            {{"path", arguments.raster},
@@ -118,7 +98,7 @@ nlohmann::ordered_json Statistics(const ColoredMeshArguments& arguments, const t
             {"rms_error", error.color_rms},
             {"samples", error.color_samples}}},
           {"seconds", {{"read", seconds.read}, {"triangulate", seconds.triangulate}, {"write", seconds.write}}},
-          {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+          {"peak_rss_bytes", PeakRssBytes()}};
 }
 
 void Print(const ColoredMeshArguments& arguments, const tin::ExtendedField& field, const tin::ColoredMesh& mesh,
@@ -159,7 +139,11 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   seconds.read = SecondsSince(start);
 
   start = Clock::now();
-  const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
+  const tin::ColoredMesh mesh = [&] {
+    tin::ExtendedGreedy greedy(source->field);
+    RunInSteps(arguments.goal, 10'000, greedy);
+    return greedy.Mesh();
+  }();
   seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();

@@ -1,6 +1,7 @@
 #include "server/cli/mesh/mesh_output.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -34,6 +35,12 @@ Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
 Result<void> MeshOutput::Write(const std::string& bytes) {
   file_.stream() << bytes;
   return file_.Commit();
+}
+
+std::int64_t PeakRssBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
 std::string TextOfVoids(std::size_t voids) {

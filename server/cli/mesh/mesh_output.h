@@ -1,8 +1,9 @@
 // Shared by the variants of `terrace mesh`: the output file and messages about it.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "engine/core/result.h"
 #include "engine/tin/mesh/height_field.h"
 #include "proto/gltf/mesh_file.h"
+#include "server/cli/common/progress.h"
 #include "server/cli/common/replaced_file.h"
 
 namespace terrace::cli {
@@ -38,6 +40,23 @@ class MeshOutput {
 struct MeshSeconds {
   double read = 0, triangulate = 0, write = 0;
 };
+
+// The largest resident memory of this process so far.
+std::int64_t PeakRssBytes();
+
+// Runs to the goal in steps of `step` vertices, and shows the progress. The error decreases roughly as 1 / vertices.
+template <typename Goal, typename Greedy>
+void RunInSteps(const Goal& goal, std::size_t step, Greedy& greedy) {
+  Progress progress("meshing");
+  Goal part = goal;
+  do {
+    part.max_points = std::min(goal.max_points, greedy.vertex_count() + step);
+    greedy.Run(part);
+    progress.Update(goal.max_points != Goal{}.max_points
+                        ? static_cast<double>(greedy.vertex_count()) / static_cast<double>(goal.max_points)
+                        : std::min(1.0, goal.max_error / greedy.CurrentError()));
+  } while (greedy.vertex_count() == part.max_points && part.max_points != goal.max_points);
+}
 
 // Number of samples without a height. `measured`: number of samples with one.
 inline std::size_t VoidsOf(const tin::HeightField& field, std::size_t measured) {
