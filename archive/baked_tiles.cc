@@ -153,7 +153,7 @@ class Baked final : public tiler::BakedTiles {
       return;
     }
     extent_.normals = manifest.kind.extensions.normals;
-    extent_.water_mask = manifest.kind.extensions.water_mask;
+    extent_.has_water = manifest.kind.extensions.water_mask;
     if (manifest.kind.extensions.metadata) extent_.metadata_availability = dataset.metadata_availability;
   }
 

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
-#include "tiler/store/baked_tiles.h"
 #include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
@@ -38,17 +37,9 @@ double WrappedLongitude(double degrees) {
 // A dataset without sources.
 void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   const tiler::BakedExtent& extent = dataset.baked->extent();
+  static_cast<tiler::DatasetExtent&>(view) = extent;
   view.only_archive = dataset.baked;
-  view.available = extent.available;
-  view.bounds = extent.bounds;
-  view.heights = extent.heights;
   view.range_bound = [baked = dataset.baked](const geo::TileKey& key) { return baked->RangeBound(key); };
-  view.has_datum = extent.has_datum;
-  view.sources = extent.sources;
-  view.has_water = extent.water_mask;
-  view.texture = extent.texture;
-  view.metadata_availability = extent.metadata_availability;
-  view.floor_m = extent.floor_m;
   view.min_mercator_depth = extent.min_mercator_depth;
   view.max_mercator_depth = extent.max_mercator_depth;
   view.height_tile_bounds = extent.height_tile_bounds;

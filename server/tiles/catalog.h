@@ -16,8 +16,8 @@
 #include "engine/geo/tile_key.h"
 #include "engine/image/imagery.h"
 #include "proto/gltf/glb_tile.h"
-#include "proto/gltf/texture.h"
 #include "tiler/encoder_version.h"
+#include "tiler/store/baked_tiles.h"
 #include "tiler/tile/requested_error.h"
 #include "tiler/tile_pipeline.h"
 
@@ -25,7 +25,7 @@ namespace terrace::server {
 
 // A dataset as requests and documents see it: its name, its extent and the tiles that exist. Its index in the catalog's
 // list is TileRequest::dataset.
-struct DatasetView {
+struct DatasetView : tiler::DatasetExtent {
   std::string name;
   std::string attribution;
   tiler::ErrorScale error_scale = {};
@@ -34,20 +34,11 @@ struct DatasetView {
   std::uint64_t cache_generation = 0;  // the dataset's part of cache keys: Dataset::cache_generation
   // tiler::TileEditsHash. Empty: there are no edits.
   std::function<std::uint64_t(const tiler::TileRequest&)> edits_hash = {};
-  std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
-  dem::GeoBounds bounds;
-  dem::HeightRange heights;  // of the data
-  double floor_m = 0;        // height where there is no data
   // ElevationModel::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Errors:
-  // those of BakedTiles::RangeBound. Empty: the range above holds for all tiles.
+  // those of BakedTiles::RangeBound. Empty: `heights` holds for all tiles.
   std::function<Result<dem::HeightRange>(const geo::TileKey&)> range_bound = {};
-  bool has_datum = true;                         // the vertical datum of its heights is known
-  std::size_t sources = 1;                       // rasters that the heights come from
-  bool has_water = false;                        // tiles have a water mask
-  std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};
-  int metadata_availability = 0;                       // tiles at multiples of this level have metadata; 0: none
   int min_mercator_depth = 0, max_mercator_depth = 1;  // of the geo::MercatorGrids of height tiles
   // Of height tiles; nothing: `bounds`.
   std::optional<dem::GeoBounds> height_tile_bounds;

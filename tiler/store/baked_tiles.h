@@ -15,22 +15,27 @@
 
 namespace terrace::tiler {
 
-// The extent of a dataset without sources: what its documents say instead of dem::DemInfo.
-struct BakedExtent {
-  std::vector<TileFormat> formats;  // of the tiles in the archive
-  std::vector<std::vector<geo::TileRange>> available;
+// What documents say of a dataset, with sources or without.
+struct DatasetExtent {
+  std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
   dem::GeoBounds bounds;
-  dem::HeightRange heights;
-  double floor_m = 0;
-  bool has_datum = true;
-  std::size_t sources = 0;   // number of sources of the baked dataset
-  int max_source_level = 0;  // of the baked dataset without edits (dem::ElevationModel::max_source_level)
+  dem::HeightRange heights;                     // of the data
+  double floor_m = 0;                           // height where there is no data
+  bool has_datum = true;                        // the vertical datum of its heights is known
+  std::size_t sources = 1;                      // rasters that the heights come from
+  bool has_water = false;                       // tiles have a water mask
+  int metadata_availability = 0;                // tiles at multiples of this level have metadata; 0: none
+  std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
+};
+
+// The extent of a dataset without sources.
+struct BakedExtent : DatasetExtent {
+  std::vector<TileFormat> formats;  // of the tiles in the archive
+  int max_source_level = 0;         // of the baked dataset without edits (dem::ElevationModel::max_source_level)
   int min_mercator_depth = 0, max_mercator_depth = 0;  // of the height tiles in the archive
   dem::GeoBounds height_tile_bounds;                   // of these tiles, within `bounds`
-  bool normals = false, water_mask = false;            // extensions of quantized-mesh tiles
-  int metadata_availability = 0;                       // tiles at multiples of it have metadata; 0: none
+  bool normals = false;                                // quantized-mesh tiles have them
   std::vector<int> error_steps;                        // of tiles with a mesh, by level; empty: 0
-  std::optional<proto::TextureFormat> texture;         // of GLB tiles
 };
 
 // Thread-safe. Find and RangeBound may block on a disk or a network; the others return at once.
