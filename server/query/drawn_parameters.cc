@@ -9,9 +9,10 @@
 namespace terrace::server {
 namespace {
 
-Result<void> SetLevel(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
-  if (!texts.level) return {};
-  const auto level = PlainDecimal(*texts.level, /*max_digits=*/2);
+Result<void> SetLevel(const SentTexts& texts, tiler::DrawnSurface& drawn) {
+  const std::string* const text = TextOf(texts, "level");
+  if (text == nullptr) return {};
+  const auto level = PlainDecimal(*text, /*max_digits=*/2);
   if (!level || *level > geo::kMaxLevel) {
     return MakeError(ErrorCode::kInvalidArgument, "level must be a whole number from 0 to {}", geo::kMaxLevel);
   }
@@ -19,18 +20,19 @@ Result<void> SetLevel(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
   return {};
 }
 
-Result<void> SetRequested(const DrawnTexts& texts, tiler::RequestedError& requested) {
-  for (const auto& [name, text, of] : {std::tuple("error", &texts.error, &requested.error_m),
-                                       std::tuple("fraction", &texts.fraction, &requested.fraction)}) {
-    if (!*text) continue;
-    *of = PositiveNumber(**text);
+Result<void> SetRequested(const SentTexts& texts, tiler::RequestedError& requested) {
+  for (const auto& [name, of] : {std::pair("error", &requested.error_m), std::pair("fraction", &requested.fraction)}) {
+    const std::string* const text = TextOf(texts, name);
+    if (text == nullptr) continue;
+    *of = PositiveNumber(*text);
     if (!*of) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
   }
   if (requested.error_m && requested.fraction) {
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
   }
-  if (!texts.at_least) return {};
-  const Result<void> set = SetOneOf(requested.at_least, "atleast", *texts.at_least, {{"0", false}, {"1", true}});
+  const std::string* const at_least = TextOf(texts, "atleast");
+  if (at_least == nullptr) return {};
+  const Result<void> set = SetOneOf(requested.at_least, "atleast", *at_least, {{"0", false}, {"1", true}});
   if (!set) return set;
   if (requested.at_least && !requested.error_m) {
     return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
@@ -38,18 +40,19 @@ Result<void> SetRequested(const DrawnTexts& texts, tiler::RequestedError& reques
   return {};
 }
 
-Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
-  if (texts.format) {
+Result<void> SetFormat(const SentTexts& texts, tiler::DrawnSurface& drawn) {
+  if (const std::string* const format = TextOf(texts, "format")) {
     using tiler::TileFormat;
-    const Result<void> set = SetOneOf(drawn.format, "format", *texts.format,
-                                      {{"terrain", TileFormat::kQuantizedMesh}, {"glb", TileFormat::kGlb}});
+    const Result<void> set =
+        SetOneOf(drawn.format, "format", *format, {{"terrain", TileFormat::kQuantizedMesh}, {"glb", TileFormat::kGlb}});
     if (!set) return set;
   }
-  if (!texts.compression) return {};
+  const std::string* const compression = TextOf(texts, "compression");
+  if (compression == nullptr) return {};
   if (drawn.format != tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
   }
-  return SetOneOf(drawn.compression.emplace(), "compression", *texts.compression, proto::kGlbCompressionNames);
+  return SetOneOf(drawn.compression.emplace(), "compression", *compression, proto::kGlbCompressionNames);
 }
 
 }  // namespace
@@ -60,17 +63,15 @@ Result<void> SetDatum(dem::HeightDatum& datum, std::string_view text) {
                   {{"ellipsoid", HeightDatum::kEllipsoid}, {"orthometric", HeightDatum::kOrthometric}});
 }
 
-Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts) {
+Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const SentTexts& texts) {
   bool is_served = false;
-  const Result<void> surface =
-      SetOneOf(is_served, "surface", texts.surface.value_or("source"), {{"source", false}, {"served", true}});
-  if (!surface) return tl::unexpected(surface.error());
+  if (const std::string* const surface = TextOf(texts, "surface")) {
+    const Result<void> set = SetOneOf(is_served, "surface", *surface, {{"source", false}, {"served", true}});
+    if (!set) return tl::unexpected(set.error());
+  }
   if (!is_served) {
-    for (const auto& [name, text] :
-         {std::pair("level", &texts.level), std::pair("error", &texts.error), std::pair("fraction", &texts.fraction),
-          std::pair("atleast", &texts.at_least), std::pair("format", &texts.format),
-          std::pair("compression", &texts.compression)}) {
-      if (*text) return MakeError(ErrorCode::kInvalidArgument, "{} needs surface=served", name);
+    for (const std::string_view name : kDrawnNames) {
+      if (texts.contains(name)) return MakeError(ErrorCode::kInvalidArgument, "{} needs surface=served", name);
     }
     return std::optional<tiler::DrawnSurface>();
   }

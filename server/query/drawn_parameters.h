@@ -2,26 +2,26 @@
 // heights. Pure.
 #pragma once
 
+#include <array>
 #include <optional>
-#include <string>
 #include <string_view>
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
+#include "server/query/parameters.h"
 #include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {
 
-// As sent; nothing: not sent.
-struct DrawnTexts {
-  std::optional<std::string> surface, level, error, fraction, at_least, format, compression;
-};
+// The parameters that need surface=served.
+inline constexpr std::array<std::string_view, 6> kDrawnNames = {"level",   "error",  "fraction",
+                                                                "atleast", "format", "compression"};
 
 // `datum`. kInvalidArgument: another word; the message is for the client.
 Result<void> SetDatum(dem::HeightDatum& datum, std::string_view text);
 
-// Nothing: the surface of the sources. kInvalidArgument, with a message for the client: a wrong value, a parameter of
-// surface=served without it, or two that exclude each other.
-Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts);
+// Reads `surface` and kDrawnNames. Nothing: the surface of the sources. kInvalidArgument, with a message for the
+// client: a wrong value, a parameter of surface=served without it, or two that exclude each other.
+Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const SentTexts& texts);
 
 }  // namespace terrace::server

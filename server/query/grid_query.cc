@@ -1,7 +1,5 @@
 #include "server/query/grid_query.h"
 
-#include <array>
-#include <iterator>
 #include <string>
 #include <utility>
 
@@ -13,35 +11,17 @@ namespace {
 
 constexpr const char* kGridNames[] = {"bbox",  "width",   "height", "spacing", "crs",      "format", "datum",
                                       "range", "surface", "level",  "error",   "fraction", "atleast"};
-enum GridName {
-  kGridBbox,
-  kGridWidth,
-  kGridHeight,
-  kGridSpacing,
-  kGridCrs,
-  kGridFormat,
-  kGridDatum,
-  kGridRange,
-  kGridSurface,
-  kGridLevel,
-  kGridError,
-  kGridFraction,
-  kGridAtLeast,
-  kGridNameCount
-};
-static_assert(std::size(kGridNames) == kGridNameCount);
-using GridTexts = std::array<std::optional<std::string>, kGridNameCount>;
 
 tl::unexpected<Error> InvalidGrid(std::string message) {
   return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
 }
 
-Result<GridTexts> GridTextsOf(std::string_view query) {
-  GridTexts texts;
+Result<SentTexts> GridTextsOf(std::string_view query) {
+  SentTexts texts;
   const Result<void> read = ReadParameters(
       query, kGridNames,
       [&](std::size_t i, const std::string& value) -> Result<void> {
-        texts[i] = value;
+        texts.emplace(kGridNames[i], value);
         return {};
       },
       "bbox, width, height, spacing, crs, format, datum, range, surface, and with surface=served level, error, "
@@ -50,22 +30,24 @@ Result<GridTexts> GridTextsOf(std::string_view query) {
   return texts;
 }
 
-Result<void> SetSize(const GridTexts& texts, dem::GridRequest& grid) {
-  if (texts[kGridSpacing]) {
-    if (texts[kGridWidth] || texts[kGridHeight]) return InvalidGrid("spacing excludes width and height");
-    grid.spacing = PositiveNumber(*texts[kGridSpacing]);
+Result<void> SetSize(const SentTexts& texts, dem::GridRequest& grid) {
+  if (const std::string* const spacing = TextOf(texts, "spacing")) {
+    if (texts.contains("width") || texts.contains("height")) return InvalidGrid("spacing excludes width and height");
+    grid.spacing = PositiveNumber(*spacing);
     return grid.spacing ? Result<void>() : InvalidGrid("spacing must be a finite number above 0, in units of the crs");
   }
-  if (!texts[kGridWidth] || !texts[kGridHeight]) return InvalidGrid("width and height, or spacing, are needed");
-  for (const auto& [name, of] : {std::pair(kGridWidth, &grid.columns), std::pair(kGridHeight, &grid.rows)}) {
-    *of = PlainDecimal(*texts[name], /*max_digits=*/15);
-    if (!*of) return InvalidGrid(fmt::format("{} must be a whole number from 2", kGridNames[name]));
+  if (!texts.contains("width") || !texts.contains("height")) {
+    return InvalidGrid("width and height, or spacing, are needed");
+  }
+  for (const auto& [name, of] : {std::pair("width", &grid.columns), std::pair("height", &grid.rows)}) {
+    *of = PlainDecimal(texts.at(name), /*max_digits=*/15);
+    if (!*of) return InvalidGrid(fmt::format("{} must be a whole number from 2", name));
   }
   return {};
 }
 
-Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& grid) {
-  if (!text) return {};
+Result<void> SetCrs(const std::string* text, dem::GridRequest& grid) {
+  if (text == nullptr) return {};
   std::string_view code = *text;
   const bool is_epsg = code.size() > 5 && EqualsIgnoringCase(code.substr(0, 5), "EPSG:");
   const auto number = is_epsg ? PlainDecimal(code.substr(5), /*max_digits=*/6) : std::nullopt;
@@ -74,8 +56,8 @@ Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& gr
   return {};
 }
 
-Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& format) {
-  if (!text) return {};
+Result<void> SetGridFormat(const std::string* text, GridFormat& format) {
+  if (text == nullptr) return {};
   return SetOneOf(format, "format", *text,
                   {{"f32", GridFormat::kF32},
                    {"r16", GridFormat::kR16},
@@ -84,8 +66,8 @@ Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& f
                    {"json", GridFormat::kJson}});
 }
 
-Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
-  if (!text) return {};
+Result<void> SetRange(const std::string* text, GridQuery& query) {
+  if (text == nullptr) return {};
   const auto numbers = NumbersOf<2>(*text);
   constexpr double kMaxScale = 1e6;  // the scale of larger ones may overflow
   if (!numbers || (*numbers)[0] >= (*numbers)[1] || (*numbers)[0] < -kMaxScale || (*numbers)[1] > kMaxScale) {
@@ -99,27 +81,27 @@ Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) 
 }  // namespace
 
 Result<GridQuery> ParseGrid(std::string_view text) {
-  const Result<GridTexts> parsed = GridTextsOf(text);
+  Result<SentTexts> parsed = GridTextsOf(text);
   if (!parsed) return tl::unexpected(parsed.error());
-  const GridTexts& texts = *parsed;
+  SentTexts& texts = *parsed;
   GridQuery query;
-  const auto box = texts[kGridBbox] ? NumbersOf<4>(*texts[kGridBbox]) : std::nullopt;
+  const std::string* const bbox = TextOf(texts, "bbox");
+  const auto box = bbox != nullptr ? NumbersOf<4>(*bbox) : std::nullopt;
   if (!box) return InvalidGrid("bbox=west,south,east,north is needed: four numbers in units of the crs");
   query.grid.west = (*box)[0], query.grid.south = (*box)[1], query.grid.east = (*box)[2], query.grid.north = (*box)[3];
   for (const Result<void>& set :
-       {SetSize(texts, query.grid), SetCrs(texts[kGridCrs], query.grid),
-        SetGridFormat(texts[kGridFormat], query.format), SetRange(texts[kGridRange], query)}) {
+       {SetSize(texts, query.grid), SetCrs(TextOf(texts, "crs"), query.grid),
+        SetGridFormat(TextOf(texts, "format"), query.format), SetRange(TextOf(texts, "range"), query)}) {
     if (!set) return tl::unexpected(set.error());
   }
-  if (texts[kGridDatum]) {
-    if (const Result<void> set = SetDatum(query.datum, *texts[kGridDatum]); !set) return tl::unexpected(set.error());
+  if (const std::string* const datum = TextOf(texts, "datum")) {
+    if (const Result<void> set = SetDatum(query.datum, *datum); !set) return tl::unexpected(set.error());
   }
-  Result<std::optional<tiler::DrawnSurface>> drawn =
-      ParseDrawn({texts[kGridSurface], texts[kGridLevel], texts[kGridError], texts[kGridFraction], texts[kGridAtLeast],
-                  std::nullopt, std::nullopt});
+  texts.erase("format");  // of the grid; ParseDrawn would take it for that of tiles
+  Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(texts);
   if (!drawn) return tl::unexpected(drawn.error());
   query.drawn = *std::move(drawn);
-  query.names_source = texts[kGridSurface].has_value() && !query.drawn;
+  query.names_source = texts.contains("surface") && !query.drawn;
   if (query.drawn && query.datum != dem::HeightDatum::kEllipsoid) {
     return InvalidGrid("surface=served has ellipsoidal heights alone, as tiles have");
   }

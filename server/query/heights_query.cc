@@ -17,19 +17,19 @@
 namespace terrace::server {
 namespace {
 
-Result<void> CheckNeedsPath(const HeightsParameters& parameters) {
-  if (!parameters.text(HeightsParameters::kStep) && !parameters.text(HeightsParameters::kSamples)) return {};
+Result<void> CheckNeedsPath(const SentTexts& texts) {
+  if (!texts.contains("step") && !texts.contains("samples")) return {};
   return MakeError(ErrorCode::kInvalidArgument, "step and samples need path");
 }
 
 // Longitude and latitude of each point as 64-bit floats.
-Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::string_view body, std::size_t max_locations,
+Result<HeightsQuery> ParseBinary(const ListParameters& parameters, std::string_view body, std::size_t max_locations,
                                  const std::stop_token& stop) {
   constexpr std::size_t kPointBytes = 2 * sizeof(double), kStopPeriod = 65536;
-  if (parameters.has_points()) {
+  if (!parameters.list().empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "locations and path exclude a body of points");
   }
-  if (const Result<void> checked = CheckNeedsPath(parameters); !checked) return tl::unexpected(checked.error());
+  if (const Result<void> checked = CheckNeedsPath(parameters.texts()); !checked) return tl::unexpected(checked.error());
   if (body.empty() || body.size() % kPointBytes != 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "the body has {} bytes, which is no multiple of 16 above 0: each point is its longitude and its "
@@ -58,9 +58,9 @@ Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::strin
   return query;
 }
 
-Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const HeightsParameters& parameters,
+Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const SentTexts& texts,
                                           std::size_t max_locations) {
-  if (const auto& step = parameters.text(HeightsParameters::kStep)) {
+  if (const std::string* const step = TextOf(texts, "step")) {
     const std::optional<double> step_m = NumberOf(*step);
     if (!step_m || *step_m <= 0) return MakeError(ErrorCode::kInvalidArgument, "step must be a finite number above 0");
     if (path.StepCount(*step_m) > static_cast<double>(max_locations)) {
@@ -73,7 +73,7 @@ Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const H
     return path.Walk(*step_m);
   }
   std::size_t samples = 0;
-  const std::string_view text = *parameters.text(HeightsParameters::kSamples);
+  const std::string_view text = texts.at("samples");
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), samples);
   const bool is_number = end == text.data() + text.size() && error != std::errc::invalid_argument;
   if (!is_number || (error == std::errc() && samples < 2)) {
@@ -85,14 +85,13 @@ Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const H
   return path.Divide(samples);
 }
 
-Result<HeightsQuery> ParsePath(HeightsParameters& parameters, std::size_t max_locations, const std::stop_token& stop) {
-  if (parameters.text(HeightsParameters::kStep).has_value() ==
-      parameters.text(HeightsParameters::kSamples).has_value()) {
+Result<HeightsQuery> ParsePath(const SentTexts& texts, std::vector<dem::GeoPosition> corners, std::size_t max_locations,
+                               const std::stop_token& stop) {
+  if (texts.contains("step") == texts.contains("samples")) {
     return MakeError(ErrorCode::kInvalidArgument, "path needs either step (metres) or samples (how many points)");
   }
-  std::vector<dem::GeoPosition> corners = parameters.TakePoints();
   if (corners.size() < 2) return MakeError(ErrorCode::kInvalidArgument, "path needs at least two points");
-  const auto points = Along(dem::GeodesicPath(std::move(corners), stop), parameters, max_locations);
+  const auto points = Along(dem::GeodesicPath(std::move(corners), stop), texts, max_locations);
   if (!points) return tl::unexpected(points.error());
   HeightsQuery query;
   query.points.reserve(points->size());
@@ -104,15 +103,15 @@ Result<HeightsQuery> ParsePath(HeightsParameters& parameters, std::size_t max_lo
   return query;
 }
 
-Result<HeightsQuery> ParsePoints(HeightsParameters& parameters, std::size_t max_locations,
-                                 const std::stop_token& stop) {
-  if (!parameters.has_points()) {
+Result<HeightsQuery> ParsePoints(const ListParameters& parameters, std::vector<dem::GeoPosition> points,
+                                 std::size_t max_locations, const std::stop_token& stop) {
+  if (parameters.list().empty()) {
     return MakeError(ErrorCode::kInvalidArgument, "either locations or path is needed: latitude,longitude|...");
   }
-  if (parameters.is_path()) return ParsePath(parameters, max_locations, stop);
-  if (const Result<void> checked = CheckNeedsPath(parameters); !checked) return tl::unexpected(checked.error());
+  if (parameters.list() == "path") return ParsePath(parameters.texts(), std::move(points), max_locations, stop);
+  if (const Result<void> checked = CheckNeedsPath(parameters.texts()); !checked) return tl::unexpected(checked.error());
   HeightsQuery query;
-  query.points = parameters.TakePoints();
+  query.points = std::move(points);
   return query;
 }
 
@@ -128,32 +127,26 @@ Result<int> ParseCertifyLevel(std::string_view text) {
 }  // namespace
 
 Result<HeightsQuery> ParseHeights(const PointsInput& input, std::size_t max_locations, const std::stop_token& stop) {
-  HeightsParameters parameters(max_locations, input.query.size() + input.body.size());
+  std::vector<dem::GeoPosition> points;
+  ListParameters parameters = HeightsParameters(max_locations, input.query.size() + input.body.size(), points);
   if (const Result<void> read = ReadInput(input, stop, parameters); !read) return tl::unexpected(read.error());
   const bool is_binary = IsBinaryBody(input.content_type);
   Result<HeightsQuery> query = is_binary ? ParseBinary(parameters, input.body, max_locations, stop)
-                                         : ParsePoints(parameters, max_locations, stop);
+                                         : ParsePoints(parameters, std::move(points), max_locations, stop);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the request any more");
   if (!query) return query;
-  if (const auto& certify = parameters.text(HeightsParameters::kCertify)) {
+  const SentTexts& texts = parameters.texts();
+  if (const std::string* const certify = TextOf(texts, "certify")) {
     const Result<int> level = ParseCertifyLevel(*certify);
     if (!level) return tl::unexpected(level.error());
     query->certify_level = *level;
   }
-  if (const auto& datum = parameters.text(HeightsParameters::kDatum)) {
+  if (const std::string* const datum = TextOf(texts, "datum")) {
     if (const Result<void> set = SetDatum(query->datum, *datum); !set) return tl::unexpected(set.error());
   }
-  if (const auto& normals = parameters.text(HeightsParameters::kNormals)) {
+  if (const std::string* const normals = TextOf(texts, "normals")) {
     const Result<void> set = SetOneOf(query->wants_normals, "normals", *normals, {{"0", false}, {"1", true}});
     if (!set) return tl::unexpected(set.error());
-  }
-  DrawnTexts texts;
-  for (const auto& [text, of] :
-       {std::pair(HeightsParameters::kSurface, &texts.surface), std::pair(HeightsParameters::kLevel, &texts.level),
-        std::pair(HeightsParameters::kError, &texts.error), std::pair(HeightsParameters::kFraction, &texts.fraction),
-        std::pair(HeightsParameters::kAtLeast, &texts.at_least), std::pair(HeightsParameters::kFormat, &texts.format),
-        std::pair(HeightsParameters::kCompression, &texts.compression)}) {
-    *of = parameters.text(text);
   }
   Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(texts);
   if (!drawn) return tl::unexpected(drawn.error());

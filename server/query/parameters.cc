@@ -90,6 +90,11 @@ class FormReader {
 
 }  // namespace
 
+const std::string* TextOf(const SentTexts& texts, std::string_view name) {
+  const auto sent = texts.find(name);
+  return sent == texts.end() ? nullptr : &sent->second;
+}
+
 TextParts PartsOf(std::string_view text, std::stop_token stop) {
   return [text, stop = std::move(stop)]() mutable -> Result<std::string_view> {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the request any more");

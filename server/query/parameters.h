@@ -6,7 +6,9 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <stop_token>
+#include <string>
 #include <string_view>
 
 #include "engine/core/result.h"
@@ -33,6 +35,12 @@ class ParameterSink {
   // A JSON object with the sink's parameters, for messages.
   virtual std::string_view JsonExample() const = 0;
 };
+
+// The values of parameters as sent, by name.
+using SentTexts = std::map<std::string_view, std::string>;
+
+// Null: the parameter was not sent.
+const std::string* TextOf(const SentTexts& texts, std::string_view name);
 
 enum class PlusSign { kIsPlus, kIsBlank };
 

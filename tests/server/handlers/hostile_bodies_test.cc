@@ -4,6 +4,7 @@
 
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "server/query/heights_parameters.h"
 #include "server/query/heights_query.h"
@@ -54,7 +55,7 @@ std::vector<Hostile> HostileBodies() {
   };
 }
 
-Result<void> Read(const Hostile& hostile, const TextParts& parts, HeightsParameters& parameters) {
+Result<void> Read(const Hostile& hostile, const TextParts& parts, ListParameters parameters) {
   std::size_t at = 0;
   return hostile.is_json ? ReadJsonObject(parts, parameters, at) : ReadForm(parts, PlusSign::kIsBlank, parameters, at);
 }
@@ -68,8 +69,8 @@ TEST(HostileBodies, AreReadAtMostOnceAndToTheirFirstFault) {
       read += part->size();
       return part;
     };
-    HeightsParameters parameters(kMaxLocations, hostile.body.size());
-    const Result<void> result = Read(hostile, parts, parameters);
+    std::vector<dem::GeoPosition> points;
+    const Result<void> result = Read(hostile, parts, HeightsParameters(kMaxLocations, hostile.body.size(), points));
     EXPECT_EQ(!result, hostile.says != nullptr) << hostile.name;
     if (!result) {
       EXPECT_NE(result.error().message.find(hostile.says), std::string::npos)
@@ -114,8 +115,8 @@ TEST(HostileBodies, EndAtTheNextPartOnceAStopIsRequested) {
       if (read >= 3 * kPartBytes) source.request_stop();
       return part;
     };
-    HeightsParameters parameters(kMaxLocations, hostile.body.size());
-    const Result<void> result = Read(hostile, parts, parameters);
+    std::vector<dem::GeoPosition> points;
+    const Result<void> result = Read(hostile, parts, HeightsParameters(kMaxLocations, hostile.body.size(), points));
     ASSERT_FALSE(result) << hostile.name;
     EXPECT_EQ(result.error().code, ErrorCode::kCancelled) << hostile.name;
     EXPECT_EQ(read, 3 * kPartBytes) << hostile.name;

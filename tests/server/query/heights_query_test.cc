@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "server/handlers/handlers.h"
 #include "server/query/heights_parameters.h"
@@ -169,20 +170,20 @@ TEST(HeightsQuery, ReadsPartsOfAnySize) {
         rest.remove_prefix(part.size());
         return part;
       };
-      HeightsParameters parameters(2, json.size());
+      std::vector<dem::GeoPosition> points;
+      ListParameters parameters = HeightsParameters(2, json.size(), points);
       std::size_t at = 0;
       const Result<void> read =
           is_json ? ReadJsonObject(parts, parameters, at) : ReadForm(parts, PlusSign::kIsBlank, parameters, at);
       ASSERT_TRUE(read) << size << ": " << read.error().message;
       EXPECT_EQ(at, (is_json ? json : form).size());
-      const auto points = parameters.TakePoints();
       ASSERT_EQ(points.size(), 2u);
       EXPECT_EQ(points[0].longitude, 2);
       EXPECT_EQ(points[1].longitude, -40);
-      EXPECT_EQ(parameters.text(HeightsParameters::kDatum), "orthometric");
-      EXPECT_EQ(parameters.text(HeightsParameters::kCertify), "12");
-      EXPECT_EQ(parameters.text(HeightsParameters::kError), "10.050");
-      EXPECT_EQ(parameters.text(HeightsParameters::kFraction), "1.0e2");
+      EXPECT_EQ(parameters.texts().at("datum"), "orthometric");
+      EXPECT_EQ(parameters.texts().at("certify"), "12");
+      EXPECT_EQ(parameters.texts().at("error"), "10.050");
+      EXPECT_EQ(parameters.texts().at("fraction"), "1.0e2");
     }
   }
 }

@@ -331,6 +331,7 @@ TEST(SightQuery, SaysWhatIsWrong) {
       {"from=46,7,1&to=-46,-173,1", "km long, the most is 3000 km"},
       {"from=46,7,1&to=46,7,2&rays=1,2,3,4,5,6", "either from and to"},
       {"rays=1,2,3,4,5", "rays: item 1 is not"},
+      {"rays=", "rays is empty"},
       {"rays=1,2,3,1,2,3|", "rays: item 2 is not"},
       {"rays=1,2,3,1,2,3|1,2,3,1,2,3|1,2,3,1,2,3", "more than 2"},
       {"from=1,2,3&to=1,2,4&refraction=x", "refraction must be"},
