@@ -49,7 +49,7 @@ void TryRecord(std::string_view bytes) {
   if (!refined) return;
   TERRACE_CHECK(SerializeRefinedTile(*refined) == bytes);
   const int cells = refined->heights.lattice.cells;
-  TERRACE_CHECK(refined->heights.stride == cells + 3 && refined->refinement.width() == cells + 1);
+  TERRACE_CHECK(refined->heights.stride == cells + 3 && refined->refinement->width() == cells + 1);
   for (int j = -1; j <= cells + 1; ++j) {
     for (int i = -1; i <= cells + 1; ++i) (void)refined->heights.At(i, j);
   }
