@@ -87,8 +87,8 @@ class PartialFolder {
 
 }  // namespace
 
-Result<void> CheckSingle(const std::string& out, const Manifest& manifest) {
-  const Result<void> checked = CheckBounds(SingleMetadata(manifest));
+Result<void> CheckSingle(const std::string& out, const Manifest& manifest, std::size_t max_values) {
+  const Result<void> checked = CheckBounds(SingleMetadata(manifest), max_values);
   if (checked) return {};
   return MakeError(ErrorCode::kInvalidArgument,
                    "{}: its metadata would be too large: {}; bake chunks, fewer levels or a smaller area", out,

@@ -3,6 +3,7 @@
 // when it is complete. kCancelled: stopped.
 #pragma once
 
+#include <cstddef>
 #include <stop_token>
 #include <string>
 
@@ -13,7 +14,7 @@ namespace terrace::archive {
 
 // kInvalidArgument: readers would refuse the file that WriteSingle makes of an archive with this manifest, because its
 // metadata are too large.
-Result<void> CheckSingle(const std::string& out, const Manifest& manifest);
+Result<void> CheckSingle(const std::string& out, const Manifest& manifest, std::size_t max_values = kMaxValues);
 // One PMTiles file with all tiles; Archive::Open reads it. kInvalidArgument: see CheckSingle.
 Result<void> WriteSingle(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 

@@ -1,5 +1,6 @@
 #include "archive/manifest.h"
 
+#include <limits>
 #include <utility>
 
 #include "archive/files/input_file.h"
@@ -25,8 +26,8 @@ Result<Manifest> ReadSingle(const std::string& path) {
 }
 
 // A manifest that is larger than readers take must not end a bake.
-Result<void> CheckJson(const std::string& path, const std::string& json) {
-  Result<void> checked = CheckBounds(json);
+Result<void> CheckJson(const std::string& path, const std::string& json, std::size_t max_values) {
+  Result<void> checked = CheckBounds(json, max_values);
   if (checked && json.size() > kMaxManifestBytes) {
     checked =
         MakeError(ErrorCode::kInvalidArgument, "it has {} bytes, and the limit is {}", json.size(), kMaxManifestBytes);
@@ -38,8 +39,12 @@ Result<void> CheckJson(const std::string& path, const std::string& json) {
 
 }  // namespace
 
-Result<void> CheckManifest(const std::string& place, const Manifest& manifest) {
-  return CheckJson(place + "/" + kManifestFile, ToJson(manifest));
+Result<void> CheckManifest(const std::string& place, Manifest manifest, std::size_t more_units,
+                           std::size_t max_values) {
+  constexpr std::uint64_t kWidest = std::numeric_limits<std::uint64_t>::max();
+  const UnitEntry widest{"7-255-127", kWidest, kWidest, kWidest, std::string(32, 'f')};
+  manifest.units.insert(manifest.units.end(), more_units, widest);
+  return CheckJson(place + "/" + kManifestFile, ToJson(manifest), max_values);
 }
 
 Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata) {
@@ -50,7 +55,7 @@ Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata
 
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
   const std::string path = place + "/" + kManifestFile, json = ToJson(manifest);
-  if (Result<void> checked = CheckJson(path, json); !checked) return checked;
+  if (Result<void> checked = CheckJson(path, json, kMaxValues); !checked) return checked;
   if (const Result<std::string> there = ReadFile(path, kMaxManifestBytes); there && *there == json) return {};
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));

@@ -5,6 +5,7 @@
 // FolderOf names.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -91,11 +92,16 @@ std::string ToJson(const Manifest& manifest);
 // kInvalidArgument: not a manifest, or one of a newer format; the message names what is wrong.
 Result<Manifest> ParseManifest(std::string_view json);
 
-// kInvalidArgument: readers would refuse the manifest of `place`, because it is too large.
-Result<void> CheckManifest(const std::string& place, const Manifest& manifest);
+// Readers refuse JSON with more values. Ten times as many as the manifest of all land of the Earth at 30 m has.
+inline constexpr std::size_t kMaxValues = 2'000'000;
+
+// kInvalidArgument: readers would refuse the manifest of `place`, because it is too large when it has `more_units` more
+// units.
+Result<void> CheckManifest(const std::string& place, Manifest manifest, std::size_t more_units,
+                           std::size_t max_values = kMaxValues);
 // Writes manifest.json by rename, so that it is complete or absent. Does not touch a manifest with the same content, so
 // that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written. kInvalidArgument:
-// see CheckManifest.
+// readers would refuse it.
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
 // The manifest in the metadata of an archive in one file. Errors: those of ParseManifest; they name `path`.
 Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata);

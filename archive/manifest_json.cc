@@ -75,10 +75,10 @@ T WholeOf(const Json& json, T min, T max) {
 constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
 // How JSON is too large; empty: it is not.
-std::string BeyondBounds(std::string_view text) {
-  // Ten times as many as the manifest of all land of the Earth at 30 m has.
-  constexpr int kMaxValues = 2'000'000, kMaxDepth = 64;
-  int values = 1, depth = 0;
+std::string BeyondBounds(std::string_view text, std::size_t max_values) {
+  constexpr int kMaxDepth = 64;
+  std::size_t values = 1;
+  int depth = 0;
   bool is_in_string = false, is_escaped = false;
   for (const char c : text) {
     if (is_in_string) {
@@ -91,7 +91,7 @@ std::string BeyondBounds(std::string_view text) {
     if (c == ',' || c == '[' || c == '{') ++values;
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') --depth;
-    if (values > kMaxValues) return fmt::format("it has more than {} values", kMaxValues);
+    if (values > max_values) return fmt::format("it has more than {} values", max_values);
     if (depth > kMaxDepth) return fmt::format("it is nested more than {} deep", kMaxDepth);
   }
   return {};
@@ -100,7 +100,7 @@ std::string BeyondBounds(std::string_view text) {
 // Parses JSON that may be made to harm: a value of two bytes takes fifty in memory, and functions of Json call
 // themselves for nested values. Throws Wrong, and what Json::parse throws.
 Json ParseBounded(std::string_view text) {
-  if (const std::string beyond = BeyondBounds(text); !beyond.empty()) {
+  if (const std::string beyond = BeyondBounds(text, kMaxValues); !beyond.empty()) {
     throw Wrong(beyond + ", which no bake writes; copy it again");
   }
   return Json::parse(text);
@@ -318,8 +318,8 @@ std::string ToJson(const Manifest& manifest) {
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-Result<void> CheckBounds(std::string_view json) {
-  const std::string beyond = BeyondBounds(json);
+Result<void> CheckBounds(std::string_view json, std::size_t max_values) {
+  const std::string beyond = BeyondBounds(json, max_values);
   if (beyond.empty()) return {};
   return MakeError(ErrorCode::kInvalidArgument, "{}", beyond);
 }

@@ -1,6 +1,7 @@
 // The manifest as part of other JSON, and numbers in JSON. manifest.h declares ToJson and ParseManifest.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -17,7 +18,7 @@ inline constexpr const char* kManifestMember = "terrace";
 Result<std::string> ManifestIn(std::string_view metadata);
 
 // kInvalidArgument: ParseManifest and ManifestIn would refuse the text because of the number or depth of its values.
-Result<void> CheckBounds(std::string_view json);
+Result<void> CheckBounds(std::string_view json, std::size_t max_values = kMaxValues);
 
 // The number that 16 hexadecimal digits state; nothing for any other text.
 std::optional<std::uint64_t> ParseHex16(std::string_view text);

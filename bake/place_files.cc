@@ -135,12 +135,17 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     error = made < 0 ? errno : 0;
     if (made >= 0) ::close(made);
-    if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) error = errno;
+    if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) {
+      error = errno;
+      ::unlink(file.c_str());
+    }
   }
   ::unlink(own.c_str());
-  if (error == 0) error = archive::SyncFolder(fs::path(file).parent_path().string());
-  if (error == 0) return true;
   if (error == EEXIST) return false;
+  if (error != 0) return why(error);
+  error = archive::SyncFolder(fs::path(file).parent_path().string());
+  if (error == 0) return true;
+  ::unlink(file.c_str());  // nobody would remove a lock whose owner was told that there is none
   return why(error);
 }
 

@@ -27,7 +27,8 @@ void Remove(const std::filesystem::path& file);
 
 // Creates a file together with its content, so that no process reads it empty. False: there is one already. An
 // object of a bucket is read again a second later: false, too, if another process has replaced it with other content.
-// Errors: the message says only why; of an object it names the object and the remedy too.
+// Errors: the message says only why; of an object it names the object and the remedy too. A folder then has no such
+// file.
 Result<bool> CreateFile(const std::string& file, const std::string& content);
 
 }  // namespace terrace::bake

@@ -94,7 +94,8 @@ class AdminApplication::Handler final : public ConnectionHandler {
   Admission Admit(Request& request, std::chrono::milliseconds /*longest_wait*/) override {
     Admission admission;
     admission.refusal = Refuse(request);
-    admission.body_remedy = "parameters belong into the URL: /admin/purge?dataset=NAME";
+    if (PathOf(request) == kPurgePath)
+      admission.body_remedy = "parameters belong into the URL: /admin/purge?dataset=NAME";
     return admission;
   }
 

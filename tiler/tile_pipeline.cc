@@ -150,8 +150,8 @@ FindMesh MeshFinder(DrawnMeshCache& drawn, RefinementCache& refinements, const D
     request.key = key;
     request.error_step = ErrorStep(surface.requested, key.level, dataset.error_scale());
     request.format = surface.format;
-    request.compression = surface.compression.value_or(dataset.glb.compression);
     const bool is_glb = surface.format == TileFormat::kGlb;
+    if (is_glb) request.compression = surface.compression.value_or(dataset.glb.compression);
     const DrawnMeshKey cache_key{dataset.generation, key, request.error_step, is_glb,
                                  is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
     if (std::shared_ptr<const DrawnMesh> known = drawn.Find(cache_key)) return known;

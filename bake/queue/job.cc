@@ -11,7 +11,7 @@
 namespace terrace::bake {
 namespace {
 
-constexpr std::array<const char*, 7> kKeys = {"job", "units", "dead", "taken", "done", "errors", "workers"};
+constexpr std::array<const char*, 8> kKeys = {"job", "units", "dead", "taken", "done", "errors", "failed", "workers"};
 
 int NumberOf(std::string_view text) {
   int number = 0;

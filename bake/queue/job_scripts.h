@@ -6,13 +6,14 @@
 //   terrace:{JOB}:dead    stream: the units that were given up: unit, why, deliveries, worker
 //   terrace:{JOB}:taken   hash: unit -> "id worker milliseconds", by Redis's clock; for people
 //   terrace:{JOB}:done    stream: the last units that were done: unit, worker, seconds; for people
-//   terrace:{JOB}:errors  hash: unit -> "worker why" of its last failure
-//   terrace:{JOB}:workers hash: worker -> milliseconds, by Redis's clock, when it was heard of last
+//   terrace:{JOB}:errors  hash: unit -> why it failed last
+//   terrace:{JOB}:failed  hash: "unit worker" -> when it failed there last
+//   terrace:{JOB}:workers hash: worker -> when it was heard of last
 //
-// The keys that are for people, the errors and the workers are accessed by pcall, because they may hold a value of
-// another type. A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node
-// of a cluster. The incarnation is a random number that is made whenever the queue is filled. A worker that took its
-// unit from an earlier filling must not acknowledge it in a later one.
+// Times are milliseconds of Redis's clock. The keys that are for people, and the last three, are accessed by pcall,
+// because they may hold a value of another type. A unit that is done is acknowledged and deleted from the stream. The
+// braces keep the keys on one node of a cluster. The incarnation is a random number that is made whenever the queue is
+// filled. A worker that took its unit from an earlier filling must not acknowledge it in a later one.
 #pragma once
 
 namespace terrace::bake::scripts {
@@ -25,14 +26,12 @@ inline constexpr const char* kNobody = "-";
 // Before each of the others. KEYS: as above. ARGV[1]: the incarnation; empty: there is no job. Redis 6.2 needs
 // replicate_commands for scripts that ask the time and then write.
 inline constexpr const char* kPrelude = R"lua(
-local job, units, dead, taken, done, errors, workers = unpack(KEYS)
+local job, units, dead, taken, done, errors, failed, workers = unpack(KEYS)
 if redis.replicate_commands then redis.replicate_commands() end
 if (redis.call('HGET', job, 'incarnation') or '') ~= ARGV[1] then return {'gone'} end
-local function note_worker(worker)
+local function now_ms()
   local time = redis.call('TIME')
-  local now = time[1] .. string.format('%03d', math.floor(time[2] / 1000))
-  redis.pcall('HSET', workers, worker, now)
-  return now
+  return time[1] .. string.format('%03d', math.floor(time[2] / 1000))
 end
 local function remove(id, name)
   local noted = redis.pcall('HGET', taken, name)
@@ -59,56 +58,72 @@ return {'ok'}
 inline constexpr const char* kRevive = R"lua(
 if redis.call('XLEN', units) > 0 or redis.call('XLEN', dead) == 0 then return {'ok'} end
 for i = 2, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
-redis.call('DEL', dead, errors)
+redis.call('DEL', dead, errors, failed)
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, worker, lease in ms. Hands out new units first, then units whose worker was silent for a lease,
-// last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter. The worker with
-// which a unit failed last does not get it again while others are heard of: a unit is given up because of itself, not
-// because of one worker without room or sources.
+// ARGV: incarnation, worker, lease in ms, number of attempts. Hands out new units first, then units whose worker was
+// silent for a lease, last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter.
+// Returns the number of deliveries of the unit, and whether other workers were heard of within a lease.
+//
+// A unit is given up because of itself, not because of a worker without room or sources. Therefore, while there is a
+// worker at which it has not failed, it comes to those at which it has failed only after a lease, and such an attempt
+// does not count as the last one. Units that kill their workers are given up all the same.
 inline constexpr const char* kTake = R"lua(
-local worker, lease = ARGV[2], ARGV[3]
-local now = note_worker(worker)
-local function hand_out(message, deliveries)
-  local name = ''
+local worker, lease, attempts = ARGV[2], tonumber(ARGV[3]), tonumber(ARGV[4])
+local now = now_ms()
+redis.pcall('HSET', workers, worker, now)
+local function is_recent(time) return math.abs(tonumber(now) - (tonumber(time) or 0)) < lease end
+local others = {}
+local heard = redis.pcall('HGETALL', workers)
+for i = 1, #heard, 2 do
+  if heard[i] ~= worker and is_recent(heard[i + 1]) then others[#others + 1] = heard[i] end
+end
+local function name_of(message)
   for i = 1, #message[2], 2 do
-    if message[2][i] == 'unit' then name = message[2][i + 1] end
+    if message[2][i] == 'unit' then return message[2][i + 1] end
   end
+  return ''
+end
+local function failure(name, at)
+  local time = redis.pcall('HGET', failed, name .. ' ' .. at)
+  return type(time) == 'string' and time
+end
+local function is_untried(name)
+  for _, other in ipairs(others) do
+    if not failure(name, other) then return true end
+  end
+  return false
+end
+local function hand_out(message, deliveries)
+  local name = name_of(message)
   redis.pcall('HSET', taken, name, message[1] .. ' ' .. worker .. ' ' .. now)
-  return {'unit', message[1], name, deliveries}
+  return {'unit', message[1], name, deliveries, #others}
 end
 local function new()
   local streams = redis.call('XREADGROUP', 'GROUP', 'bakers', worker, 'COUNT', 1, 'STREAMS', units, '>')
   return streams and streams[1][2][1]
 end
-local others
-local function has_others()
-  if others ~= nil then return others end
-  others = false
-  local heard = redis.pcall('HGETALL', workers)
-  for i = 1, #heard, 2 do
-    if heard[i] ~= worker and tonumber(now) - (tonumber(heard[i + 1]) or 0) < tonumber(lease) then others = true end
-  end
-  return others
-end
-local function failed_here(message)
-  local noted = redis.pcall('HGET', errors, message[2][2])
-  return type(noted) == 'string' and string.sub(noted, 1, #worker + 1) == worker .. ' '
-end
 local message = new()
 if message then return hand_out(message, 1) end
-local from = '0-0'
+local from, skipped = '0-0', 0
 repeat
   local claimed = redis.call('XAUTOCLAIM', units, 'bakers', worker, lease, from, 'COUNT', 1)
   from = claimed[1]
   message = claimed[2][1]
   if message then
     local deliveries = redis.call('XPENDING', units, 'bakers', message[1], message[1], 1)[1][4]
-    if not (failed_here(message) and has_others()) then return hand_out(message, deliveries) end
+    local name = name_of(message)
+    local time = failure(name, worker)
+    local is_open = redis.pcall('HEXISTS', errors, name) == 1 and is_untried(name)
+    if not (is_open and time and is_recent(time)) then
+      if is_open and deliveries <= 3 * attempts then deliveries = math.min(deliveries, attempts - 1) end
+      return hand_out(message, deliveries)
+    end
     redis.call('XCLAIM', units, 'bakers', '-', 0, message[1], 'IDLE', lease, 'RETRYCOUNT', deliveries - 1, 'JUSTID')
+    skipped = skipped + 1
   end
-until from == '0-0'
+until from == '0-0' or skipped == 50
 if redis.call('XLEN', units) > 0 then return {'wait'} end
 if redis.call('XLEN', dead) > 0 then return {'incomplete'} end
 if redis.call('HGET', job, 'state') == 'finished' then return {'finished'} end
@@ -118,7 +133,7 @@ return hand_out(new(), 1)
 
 // ARGV: incarnation, worker, ids. Renews the leases of those ids that this worker still holds.
 inline constexpr const char* kBeat = R"lua(
-note_worker(ARGV[2])
+redis.pcall('HSET', workers, ARGV[2], now_ms())
 for i = 3, #ARGV do
   local pending = redis.call('XPENDING', units, 'bakers', ARGV[i], ARGV[i], 1)[1]
   if pending and pending[2] == ARGV[2] then
@@ -151,7 +166,10 @@ return {'ok'}
 inline constexpr const char* kGiveBack = R"lua(
 local pending = redis.call('XPENDING', units, 'bakers', ARGV[2], ARGV[2], 1)[1]
 if not pending or pending[2] ~= ARGV[4] then return {'ok'} end
-if ARGV[5] ~= '' then redis.pcall('HSET', errors, ARGV[3], ARGV[4] .. ' ' .. ARGV[5]) end
+if ARGV[5] ~= '' then
+  redis.pcall('HSET', errors, ARGV[3], ARGV[5])
+  redis.pcall('HSET', failed, ARGV[3] .. ' ' .. ARGV[4], now_ms())
+end
 redis.pcall('HDEL', taken, ARGV[3])
 redis.call('XCLAIM', units, 'bakers', '-', 0, ARGV[2], 'IDLE', ARGV[7], 'RETRYCOUNT', ARGV[6], 'JUSTID')
 return {'ok'}
@@ -162,13 +180,18 @@ inline constexpr const char* kBury = R"lua(
 local why = ARGV[5]
 if why == '' then
   why = redis.pcall('HGET', errors, ARGV[3])
-  why = type(why) == 'string' and string.match(why, '^%S+ (.*)$')
-  if not why then why = 'its workers ended before it was done: killed, out of memory, or cut off' end
+  if type(why) ~= 'string' then why = 'its workers ended before it was done: killed, out of memory, or cut off' end
 end
 if remove(ARGV[2], ARGV[3]) then
   redis.call('XADD', dead, '*', 'unit', ARGV[3], 'why', why, 'deliveries', ARGV[6], 'worker', ARGV[4])
 end
 redis.pcall('HDEL', errors, ARGV[3])
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, worker, which ends.
+inline constexpr const char* kLeave = R"lua(
+redis.pcall('HDEL', workers, ARGV[2])
 return {'ok'}
 )lua";
 

@@ -13,8 +13,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// After a failed attempt at a unit, longer after each further one; after a take that found no unit, and after a failed
-// connection.
+// After a failed attempt at a unit, doubled after each further one if there are other workers; after a take that found
+// no unit, and after a failed connection.
 constexpr milliseconds kPauseAfterFailure{500}, kPauseWithoutUnits{500}, kPauseWithoutRedis{1000};
 
 constexpr int kFailuresToReport = 5;  // one after the other
@@ -60,6 +60,9 @@ bool RedisQueue::Leave() {
       Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
     }
     finish_.reset();
+    if (!incarnation_.empty()) {
+      outbox_.push_back({ScriptCommand(options_.job, scripts::kLeave, {incarnation_, options_.worker}), {}});
+    }
   }
   const std::lock_guard calls(calls_);
   const bool is_sent = Flush().has_value();
@@ -249,7 +252,7 @@ std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
   {
     const std::lock_guard lock(mutex_);
     if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
-    arguments = {incarnation_, options_.worker, Millis(lease_)};
+    arguments = {incarnation_, options_.worker, Millis(lease_), std::to_string(kMaxAttempts)};
   }
   const auto reply = Exchange(ScriptCommand(options_.job, scripts::kTake, std::move(arguments)));
   if (!reply) return WaitOrOver();
@@ -274,6 +277,7 @@ std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply
   const std::string name(reply[2].text());
   const int deliveries = static_cast<int>(reply[3].integer());
   const std::lock_guard lock(mutex_);
+  has_others_ = reply[4].integer() > 0;
   const Held held{incarnation_, std::string(reply[1].text()), deliveries, Clock::now()};
   const bool is_finish = name == scripts::kFinishUnit;
   const auto found = index_.find(name);
@@ -325,25 +329,30 @@ void RedisQueue::Return(std::size_t unit) {
 }
 
 bool RedisQueue::Fail(std::size_t unit, const Error& why) {
-  const std::lock_guard lock(mutex_);
-  const auto held = held_.extract(unit);
-  if (held.empty()) return true;
-  const int deliveries = held.mapped().deliveries;
   const std::string message = why.message.empty() ? "failed" : why.message;
-  // A worker without room or sources fails at once, and must not take all units from the others.
-  constexpr int kMaxDoublings = 10;
-  next_take_ = Clock::now() + std::min(kPauseAfterFailure * (1 << std::min(failures_++, kMaxDoublings)), lease_ / 8);
-  if (failures_ == kFailuresToReport && options_.on_message) {
-    options_.on_message(
-        fmt::format("the last {} units failed here: {}; if other workers bake them, end this one", failures_, message));
+  std::string remark;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto held = held_.extract(unit);
+    if (held.empty()) return true;
+    // A worker without room or sources fails at once, and must not take all units from the others.
+    constexpr int kMaxDoublings = 10;
+    const milliseconds pause = kPauseAfterFailure * (1 << std::min(failures_++, kMaxDoublings));
+    if (has_others_) next_take_ = Clock::now() + std::min(pause, lease_ / 8);
+    if (has_others_ && failures_ == kFailuresToReport) {
+      remark = fmt::format("the last {} units failed here: {}; if the other workers bake them, end this one", failures_,
+                           message);
+    }
+    const int deliveries = held.mapped().deliveries;
+    if (deliveries >= kMaxAttempts) {
+      Send(held.mapped(), scripts::kBury, {options_.units[unit], options_.worker, message, std::to_string(deliveries)});
+      return false;
+    }
+    Send(held.mapped(), scripts::kGiveBack,
+         {options_.units[unit], options_.worker, message, std::to_string(deliveries),
+          Millis(lease_ - kPauseAfterFailure * deliveries)});
   }
-  if (deliveries >= kMaxAttempts) {
-    Send(held.mapped(), scripts::kBury, {options_.units[unit], options_.worker, message, std::to_string(deliveries)});
-    return false;
-  }
-  Send(held.mapped(), scripts::kGiveBack,
-       {options_.units[unit], options_.worker, message, std::to_string(deliveries),
-        Millis(lease_ - kPauseAfterFailure * deliveries)});
+  if (!remark.empty() && options_.on_message) options_.on_message(remark);
   return true;
 }
 

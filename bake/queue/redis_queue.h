@@ -119,6 +119,7 @@ class RedisQueue : public UnitQueue {
   mutable std::mutex mutex_;       // of what follows; never held while Redis is waited for
   Clock::time_point next_take_{};  // Take does not ask before
   int failures_ = 0;               // of this worker since a unit was done
+  bool has_others_ = false;        // other workers were heard of when the last unit was taken
   std::string incarnation_;
   std::chrono::milliseconds lease_;
   std::map<std::size_t, Held> held_;

@@ -12,7 +12,7 @@
 
 namespace terrace::dem {
 
-// Blocks by key, up to a number of bytes; the least recently used ones are dropped first. Thread-safe.
+// Blocks by key, up to a number of bytes or one block; the least recently used ones are dropped first. Thread-safe.
 template <typename Key, typename Block, typename Hash = std::hash<Key>>
 class LruBlockCache {
  public:

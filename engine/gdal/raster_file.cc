@@ -434,9 +434,10 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
   if (IsAllowedRemote(path) || !LooksLikeVrt(path)) return files;
   std::set<std::string> known(files.begin(), files.end());
   for (const std::string& part : PartsOfVrt(path)) {
-    for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
-      if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
-      if (IsAllowedRemote(part)) break;  // each file beside it would take a request
+    if (known.insert(part).second) files.push_back(part);
+    if (IsAllowedRemote(part)) continue;  // each file beside it would take a request
+    for (const std::string_view suffix : kSidecarSuffixes) {
+      if (std::string name = part + std::string(suffix); known.insert(name).second) files.push_back(std::move(name));
     }
   }
   return files;

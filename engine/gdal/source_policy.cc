@@ -123,10 +123,10 @@ Result<void> CheckOverviewFile(const std::string& path) {
 }
 
 Result<void> CheckOverviewsBeside(const std::string& path) {
-  for (const char* suffix : {".ovr", ".msk"}) {
-    const std::string file = path + suffix;
+  for (const std::string_view suffix : kSidecarSuffixes) {
+    const std::string file = path + std::string(suffix);
     std::error_code ignored;
-    if (!fs::is_regular_file(file, ignored)) continue;
+    if (suffix == ".aux.xml" || !fs::is_regular_file(file, ignored)) continue;
     if (auto checked = CheckOverviewFile(file); !checked) return checked;
   }
   return {};
@@ -135,8 +135,8 @@ Result<void> CheckOverviewsBeside(const std::string& path) {
 // Files that GDAL opens automatically beside a raster. If they exist, they must be allowed, too.
 Result<void> CheckSidecarNames(const SourcePolicy& policy, const std::string& path) {
   if (policy.roots.empty()) return {};
-  for (const char* suffix : {".ovr", ".msk", ".aux.xml", ".msk.ovr"}) {
-    const std::string sidecar = path + suffix;
+  for (const std::string_view suffix : kSidecarSuffixes) {
+    const std::string sidecar = path + std::string(suffix);
     if (::access(sidecar.c_str(), F_OK) != 0) continue;
     if (auto checked = CheckFile(policy, sidecar); !checked) return checked;
   }

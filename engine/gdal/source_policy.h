@@ -5,7 +5,9 @@
 // before they are opened.
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -22,6 +24,11 @@ struct SourcePolicy {
 
   friend bool operator==(const SourcePolicy&, const SourcePolicy&) = default;
 };
+
+// Files of these names beside a raster are opened by GDAL without being asked (GDALDefaultOverviews). On Linux, GDAL
+// also finds the names in capitals.
+inline constexpr std::array<std::string_view, 11> kSidecarSuffixes = {
+    ".aux.xml", ".ovr", ".OVR", ".msk", ".MSK", ".msk.ovr", ".msk.OVR", ".MSK.ovr", ".MSK.OVR", ".aux", ".AUX"};
 
 // Sets the policy of the process. The default is an empty policy. Thread-safe, but no source should be opened during
 // the call, because it removes and restores drivers. kInvalidArgument: a root is not a folder, a prefix is not remote,

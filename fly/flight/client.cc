@@ -384,8 +384,9 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
     }
     const Tile& loaded = tile.MeshTile();
     const bool is_of_level_0 = loaded.key && loaded.key->level == 0;
-    record.sees_data |=
-        tile.HasMesh() && (!is_of_level_0 || can_refine || drawn.error_px < options_.select.max_error_px);
+    const bool suffices =
+        !is_of_level_0 || can_refine || !tree_->has_finer_levels() || drawn.error_px < options_.select.max_error_px;
+    record.sees_data |= tile.HasMesh() && suffices;
     if (tile.state != LoadState::kReady || loaded.version == 0) continue;
     if (loaded.stated_error_m >= 0 && drawn.distance_m > 0) {
       const double px = view.ErrorInPixels(loaded.stated_error_m, drawn.distance_m);

@@ -113,9 +113,10 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   totals.hole_frames += hole > 0 ? 1 : 0;
   totals.uncovered_frames += coverage.uncovered > 0 ? 1 : 0;
   totals.worst_hole = std::max(totals.worst_hole, hole);
+  if (record.drawn == 0) return;
   totals.worst_px = std::max(totals.worst_px, record.worst_px);
   totals.worst_stated_px = std::max(totals.worst_stated_px, record.worst_stated_px);
-  if (record.drawn > 0) totals.frame_worst_px.Add(record.worst_px);
+  totals.frame_worst_px.Add(record.worst_px);
 }
 
 void Statistics::AddLoadedTile(const geo::TileKey& key) {

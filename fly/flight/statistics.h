@@ -66,7 +66,7 @@ struct FrameRecord {
   bool is_waiting = false;  // the picture lacks tiles other than those that have failed
   bool is_loaded = false;   // waits for nothing, and nothing is left to load ahead
   bool is_mixed = false;    // shows tiles of more than one version
-  bool sees_data = false;   // the view asks for more than level 0, or level 0 suffices for it
+  bool sees_data = false;   // shows more than level 0, or level 0 suffices for the view or is all there is
   bool is_late = false;
   double worst_px = 0;         // of the geometric errors of drawn tiles that can be refined
   double worst_stated_px = 0;  // of the errors that the server stated, at tiles whose volume the camera is not in
@@ -105,12 +105,12 @@ struct Totals {
   // Flying frames whose Coverage has rays; those of them with holes; those where no tile was selected at some
   // point.
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
-  double worst_hole = 0;  // share of the screen
-  double worst_px = 0, worst_stated_px = 0;
-  ValueCounts latencies_s;         // of tiles that arrived
-  std::uint64_t failed_tiles = 0;  // at the end
-  ValueCounts open_s;              // how long the tiles were waited for that had neither arrived nor failed at the end
-  ValueCounts frame_worst_px;      // of flying frames that drew a mesh
+  double worst_hole = 0;                       // share of the screen
+  double worst_px = -1, worst_stated_px = -1;  // of flying frames that drew a mesh; -1: there was none
+  ValueCounts latencies_s;                     // of tiles that arrived
+  std::uint64_t failed_tiles = 0;              // at the end
+  ValueCounts open_s;          // how long the tiles were waited for that had neither arrived nor failed at the end
+  ValueCounts frame_worst_px;  // of flying frames that drew a mesh
   std::map<int, std::uint64_t> tiles_by_level;
   // How often each failure, version change and note on the document occurred. After 50 texts, failures with new ones
   // are "other messages".

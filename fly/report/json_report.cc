@@ -40,8 +40,8 @@ Json SummaryJson(const Summary& summary) {
   json["mixed_version_frames"] = totals.mixed_frames;
   json["screen_error_px"] = {{"p50", OrNull(summary.frame_p50_px)},
                              {"p99", OrNull(summary.frame_p99_px)},
-                             {"max", Rounded(totals.worst_px)},
-                             {"stated_max", Rounded(totals.worst_stated_px)}};
+                             {"max", OrNull(totals.worst_px)},
+                             {"stated_max", OrNull(totals.worst_stated_px)}};
   json["holes"] = {{"examined_frames", totals.measured_frames},
                    {"frames", totals.hole_frames},
                    {"uncovered_frames", totals.uncovered_frames},

@@ -52,6 +52,7 @@ class LevelRanges {
 struct Layer {
   std::string version, tile_template, note;
   std::vector<LevelRanges> available;
+  bool has_finer_levels = false;
 };
 
 Result<Layer> ParseLayer(std::string_view text) {
@@ -93,6 +94,7 @@ Result<Layer> ParseLayer(std::string_view text) {
                           range.at("endX").get<std::int64_t>(), range.at("endY").get<std::int64_t>()});
       }
       has_tiles |= !ranges.empty();
+      layer.has_finer_levels |= !ranges.empty() && !layer.available.empty();
       layer.available.emplace_back(std::move(ranges));
       if (layer.available.size() > geo::kMaxLevel) break;
     }
@@ -118,6 +120,7 @@ class LayerTree : public TileTree {
   explicit LayerTree(Layer layer) : layer_(std::move(layer)) {
     version_ = layer_.version;
     note_ = layer_.note;
+    has_finer_levels_ = layer_.has_finer_levels;
     root_.content = Content::kStructure;
     root_.always_refine = true;
     root_.state = LoadState::kReady;
@@ -172,6 +175,7 @@ class LayerTree : public TileTree {
     if (!layer) return tl::unexpected(std::move(layer).error());
     layer_ = *std::move(layer);
     version_ = layer_.version;
+    has_finer_levels_ = layer_.has_finer_levels;
     return {};
   }
 

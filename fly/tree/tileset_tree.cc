@@ -170,6 +170,12 @@ void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile
   for (const Json& child : json.at("children")) ParseTile(child, tile.geometric_error_m, depth + 1, AddTile(tile));
 }
 
+bool HasFinerLevels(const Tile& tile) {
+  return tile.children_unknown || (tile.key && tile.key->level > 0) ||
+         std::any_of(tile.children.begin(), tile.children.end(),
+                     [](const auto& child) { return HasFinerLevels(*child); });
+}
+
 class TilesetTree : public TileTree {
  public:
   explicit TilesetTree(const Json& json) {
@@ -180,6 +186,7 @@ class TilesetTree : public TileTree {
     root_.volume = ParseVolume(top.at("boundingVolume"));
     ParseTile(top, top.at("geometricError").get<double>() * 2, 0, AddTile(root_));
     version_ = first_version_ = VersionOf(json);
+    has_finer_levels_ = HasFinerLevels(root_);
   }
 
   void AddChildren(Tile& tile) override {

@@ -232,15 +232,19 @@ Result<std::size_t> SharedStore::Erase(const std::string& prefix,
   std::size_t erased = 0;
   {
     std::unique_lock lock(mutex_);
-    std::erase_if(queue_, [&](const Job& job) {
-      if (!job.value || !job.key.starts_with(prefix) || !is_chosen(job.key)) return false;
-      queued_bytes_ -= job.charge;
-      ++erased;
-      return true;
-    });
-    // A batch on its way would be written after the scan. Later batches have no such value of before.
+    const auto erase_queued = [&] {
+      std::erase_if(queue_, [&](const Job& job) {
+        if (!job.value || !job.key.starts_with(prefix) || !is_chosen(job.key)) return false;
+        queued_bytes_ -= job.charge;
+        ++erased;
+        return true;
+      });
+    };
+    erase_queued();
+    // The batch on its way would be written after the scan. Later ones have no value that was queued before.
     const std::uint64_t batch = batches_;
     changed_.wait(lock, stop, [&] { return !is_writing_ || batches_ != batch; });
+    erase_queued();
   }
   const auto stopped = [] { return MakeError(ErrorCode::kCancelled, "stopped while the shared cache was purged"); };
   if (stop.stop_requested()) return stopped();

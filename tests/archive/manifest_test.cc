@@ -150,10 +150,8 @@ TEST(ManifestTest, NonsenseIsRefused) {
 TEST(ManifestTest, OneThatReadersRefuseIsNotWritten) {
   const test_support::ScratchDirectory scratch;
   Manifest manifest = FullManifest();
-  manifest.available.back().assign(420'000, {4, 2, 5, 3});
-  const std::string json = ToJson(manifest);
-  EXPECT_LT(json.size(), std::size_t{32} << 20) << "small enough, but with too many values";
-  EXPECT_FALSE(ParseManifest(json));
+  manifest.identity = "{\"deep\": " + std::string(100, '[') + std::string(100, ']') + "}";
+  EXPECT_FALSE(ParseManifest(ToJson(manifest)));
   const Result<void> written = WriteManifest(scratch.path().string(), manifest);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::kInvalidArgument);
@@ -161,11 +159,27 @@ TEST(ManifestTest, OneThatReadersRefuseIsNotWritten) {
 }
 
 TEST(ManifestTest, ASingleFileStatesRangesTwice) {
+  constexpr std::size_t kLimit = 2000;
   Manifest manifest = FullManifest();
-  EXPECT_TRUE(CheckSingle("out.pmtiles", manifest));
-  manifest.available.back().assign(210'000, {4, 2, 5, 3});
-  EXPECT_TRUE(CheckManifest("out", manifest));
-  EXPECT_FALSE(CheckSingle("out.pmtiles", manifest));
+  EXPECT_TRUE(CheckSingle("out.pmtiles", manifest, kLimit));
+  manifest.available.back().assign(210, {4, 2, 5, 3});
+  EXPECT_TRUE(CheckManifest("out", manifest, 0, kLimit));
+  EXPECT_FALSE(CheckSingle("out.pmtiles", manifest, kLimit));
+}
+
+// A bake is refused before it begins, when its units are not known but their number is.
+TEST(ManifestTest, UnitsToComeCount) {
+  constexpr std::size_t kLimit = 500;
+  Manifest manifest = FullManifest();
+  manifest.units.clear();
+  std::size_t units = 0;
+  while (CheckManifest("out", manifest, units, kLimit)) ++units;
+  EXPECT_GT(units, 10U);
+  EXPECT_LT(units, kLimit / 5);
+  manifest.units.assign(units, {"7-1-2", 1, 2, 3, "00"});
+  EXPECT_FALSE(CheckManifest("out", manifest, 0, kLimit));
+  manifest.units.pop_back();
+  EXPECT_TRUE(CheckManifest("out", manifest, 0, kLimit));
 }
 
 TEST(ManifestTest, UnitNames) {

@@ -154,15 +154,20 @@ class Queue(QueueCase):
 
     def test_a_worker_that_always_fails_spoils_nothing(self):
         place, box = self.place(), ("--bbox", "12.4,30.4,12.6,30.6")
-        right = self.start(place, *box, lease=20)
+        right = self.start(place, *box, lease=120)
         right.stdout.readline()
         right.send_signal(signal.SIGSTOP)  # the other worker is heard of for a lease, and takes nothing
-        broken = self.start(place, *box, lease=20, limit=1000)
-        until = time.monotonic() + 60
+        broken = self.start(place, *box, lease=120, limit=1000)
+        until = time.monotonic() + 100
         while self.redis("XLEN", self.key("units")) > self.redis("HLEN", self.key("errors")) + 1:
             self.assertLess(time.monotonic(), until)
             time.sleep(0.02)
-        time.sleep(2)  # to try them again
+        # Until it has asked for more in vain.
+        name = next(name for name in self.redis("HKEYS", self.key("failed"))).split(" ", 1)[1]
+        heard = self.redis("HGET", self.key("workers"), name)
+        while self.redis("HGET", self.key("workers"), name) == heard:
+            self.assertLess(time.monotonic(), until)
+            time.sleep(0.02)
         deliveries = [entry[3] for entry in self.redis("XPENDING", self.key("units"), "bakers", "-", "+", 100)]
         self.assertEqual(set(deliveries), {1}, "a unit that failed is for the other worker")
         right.send_signal(signal.SIGCONT)

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import urllib.request
 
-import fault_proxy
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+import fault_proxy  # noqa: E402
+import in_parallel  # noqa: E402
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -27,6 +29,15 @@ def stop_server():
     SERVER.terminate()
     SERVER.stdout.close()
     SERVER.wait(60)
+
+
+def main():
+    """Runs the tests of the program over one server."""
+    start_server()
+    try:
+        in_parallel.main()
+    finally:
+        stop_server()
 
 
 def fly(address, *options, path="jacksboro", way=WAY, duration="2"):

@@ -14,9 +14,8 @@ import urllib.request
 
 import fault_proxy
 import flights
+import in_parallel  # flights has set the path
 from flights import BINARY, DEM, WAY, Configured, fly, fly_to, fly_with_fault
-
-setUpModule, tearDownModule = flights.start_server, flights.stop_server
 
 
 class SoundServer(unittest.TestCase):
@@ -55,24 +54,34 @@ class SoundServer(unittest.TestCase):
         self.assertGreater(report["summary"]["screen_error_px"]["stated_max"], 0)
         self.assertLess(report["summary"]["screen_error_px"]["stated_max"], 9999)
 
-    def test_says_that_the_place_is_wrong(self):
-        def without_the_root_of_the_east(path, status, headers, body):
+    @staticmethod
+    def fly_with_roots(levels, roots, *options, **more):
+        """(exit status, report) of a flight by a layer.json of that many levels, with these tiles at level 0."""
+        def change(path, status, headers, body):
             if path.split("?")[0].endswith("layer.json"):
                 headers.pop("Content-Encoding", None)
                 document = json.loads(urllib.request.urlopen(f"http://{flights.UPSTREAM}/jacksboro/layer.json", timeout=60).read())
-                document["available"][0] = [{"startX": 0, "startY": 0, "endX": 0, "endY": 0}]
+                document["available"] = [[roots], *document["available"][1:levels]]
                 body = json.dumps(document).encode()
             return status, headers, body
 
-        for rewrite in (None, without_the_root_of_the_east):
-            with self.subTest(rewrite=rewrite), fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=rewrite) as proxy:
-                status, report = fly(proxy.address, "--require", "full-view=60s,refined=1%,holes=0,screen-error=1000px",
-                                     way=["--circle", "84.25,36.3,1500,8000"], duration="1")
-                self.assertEqual(status, 1)
-                self.assertGreater(report["summary"]["tiles"], 0)
-                self.assertIn("no terrain of the dataset", " ".join(report["summary"]["findings"]))
-                if rewrite:
-                    self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False] * 4)
+        with fault_proxy.FaultProxy(flights.UPSTREAM, rewrite=change) as proxy:
+            return fly(proxy.address, *options, duration="1", **more)
+
+    def test_says_that_the_place_is_wrong(self):
+        for end in (1, 0):  # 0: nothing in the east
+            status, report = self.fly_with_roots(99, {"startX": 0, "startY": 0, "endX": end, "endY": 0}, "--require",
+                                                 "full-view=60s,refined=1%,holes=0,screen-error=1000px", way=["--circle", "84.25,36.3,1500,8000"])
+            self.assertEqual(status, 1)
+            self.assertGreater(report["summary"]["tiles"], 0)
+            self.assertIn("no terrain of the dataset", " ".join(report["summary"]["findings"]))
+        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False] * 4)
+
+    def test_takes_level_0_for_terrain_where_there_is_no_other(self):
+        status, report = self.fly_with_roots(1, {"startX": 0, "startY": 0, "endX": 1, "endY": 0})
+        self.assertEqual(status, 0, report)
+        self.assertNotIn("no terrain", " ".join(report["summary"]["findings"]))
+        self.assertLessEqual(report["summary"]["tiles"], 2)
 
     def test_takes_the_format_from_the_path_of_the_url(self):
         for path, form in (("a/layer.json?x=tileset.json", "terrain"), ("a/tileset.json?x=layer.json", "3dtiles")):
@@ -144,6 +153,59 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual(status, 1)
                 self.assertRegex(" ".join(summary["findings"]), r'status 401: a token is needed: .*; send a token with --header "Authorization: Bearer')
                 self.assertEqual(fly_to(url, "--header", f"Authorization: Bearer {token}")[0], 0)
+
+    @unittest.skipUnless(shutil.which("openssl"), "needs openssl")
+    def test_loads_the_view_by_https_if_it_trusts_the_server(self):
+        with tempfile.TemporaryDirectory() as folder:
+            certificate, key = pathlib.Path(folder, "tls.crt"), pathlib.Path(folder, "tls.key")
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
+                            "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate],
+                           check=True, stderr=subprocess.DEVNULL)
+            with Configured(folder, {"tls": {"certificate": str(certificate), "key": str(key)},
+                                     "datasets": [{"name": "jacksboro", "sources": [str(DEM)]}]}) as server:
+                url = f"https://localhost:{server.port}/jacksboro"
+                trusted = {"SSL_CERT_FILE": str(certificate)}
+                for tiles in ("terrain", "3dtiles"):
+                    status, summary = fly_to(url, "--format", tiles, "--forbid-holes", "--require", "full-view=60s,errors=0,refusals=0,holes=0",
+                                             environment=trusted)
+                    self.assertEqual(status, 0, summary)
+                    self.assertGreater(summary["tiles"], 60)
+                    self.assertLessEqual(summary["connections"], 20)
+                # Not trusted, or another name than the certificate's: nothing is loaded, and nothing is tried again.
+                for wrong, environment in ((url, {"SSL_CERT_FILE": "/dev/null"}), (url.replace("localhost", "127.0.0.1"), trusted)):
+                    status, answer = fly_to(wrong, environment=environment)
+                    self.assertEqual(status, 1, answer)
+                    self.assertIn("certificate verify failed", str(answer))
+                    self.assertIn("SSL_CERT_FILE", str(answer))
+                    self.assertEqual(answer["outcomes"]["no_connection"], 1, "asking again does not help")
+                status, summary = fly_to(url.replace("localhost", "127.0.0.1"), "--insecure", "--require", "full-view=60s,errors=0")
+                self.assertEqual(status, 0, summary)
+
+    def test_has_no_hole_around_deeper_levels(self):
+        """Around `precision` there are levels below those of the sources, and nowhere else."""
+        with tempfile.TemporaryDirectory() as folder:
+            box = [[-84.2505, 36.2995], [-84.2495, 36.2995], [-84.2495, 36.3005], [-84.2505, 36.3005], [-84.2505, 36.2995]]
+            edits = {"type": "FeatureCollection", "features": [
+                {"type": "Feature", "properties": {"terrain": {"op": "precision", "error_m": 0.5, "blend_m": 50}},
+                 "geometry": {"type": "Polygon", "coordinates": [box]}}]}
+            pathlib.Path(folder, "edits.geojson").write_text(json.dumps(edits), encoding="utf-8")
+            with Configured(folder, {"datasets": [{"name": "jacksboro", "sources": [str(DEM)], "edits": ["edits.geojson"]},
+                                                  {"name": "plain", "sources": [str(DEM)]}]}) as server:
+                def levels(name):
+                    with urllib.request.urlopen(f"http://127.0.0.1:{server.port}/{name}/layer.json", timeout=60) as reply:
+                        return len(json.load(reply)["available"])
+                self.assertGreater(levels("jacksboro"), levels("plain") + 2)
+                for tiles in ("terrain", "3dtiles"):
+                    urls = pathlib.Path(folder, "urls-" + tiles)
+                    status, summary = fly_to(f"http://127.0.0.1:{server.port}/jacksboro", "--format", tiles, "--forbid-holes", "--urls", urls,
+                                             "--require", "full-view=60s,errors=0,refusals=0,holes=0",
+                                             way=["--circle", "-84.25,36.30,700,250", "--speed", "100"])
+                    self.assertEqual(status, 0, summary)
+                    self.assertGreater(summary["holes"]["examined_frames"], 3)
+                    # /jacksboro/LEVEL/X/Y.terrain, /jacksboro/3dtiles/LEVEL-X-Y/LEVEL_BELOW/X/Y.glb
+                    found = re.findall(r"^/jacksboro/(?:3dtiles/(\d+)-\d+-\d+/)?(\d+)/\d+/\d+\.(?:terrain|glb)", urls.read_text(), re.M)
+                    asked = [int(root or 0) + int(level) for root, level in found]
+                    self.assertGreaterEqual(max(asked), levels("plain") + 1, tiles)
 
 
 class Faults(unittest.TestCase):
@@ -218,6 +280,7 @@ class Faults(unittest.TestCase):
                 self.assertEqual(code, 1)
                 self.assertEqual(report["summary"]["messages"], {"document: " + part: 1})
 
+    @in_parallel.alone
     def test_counts_faults_and_flies_on(self):
         def every(period, fault):
             return lambda handler, number: number % period == 0 and fault(handler)
@@ -313,7 +376,7 @@ class Faults(unittest.TestCase):
     def test_fills_the_holes_of_a_version_that_is_gone(self):
         rest = ["--from", "-84.25,36.3,1500", "--to", "-84.25,36.3,1500"]
         # At rest all tiles fail before the document may be read again. Later new tiles fail, and the document is read at once.
-        for more in ({"tiles": 20, "way": rest, "duration": "3"}, {"after_s": 3, "duration": "8"}):
+        for more in ({"tiles": 20, "way": rest, "duration": "3"}, {"after_s": 3, "duration": "5"}):
             with self.subTest(**more):
                 status, summary = self.fly_over_a_change(is_gone=True, **more)
                 self.assertEqual((status, summary["version_changes"]), (0, 1), summary)
@@ -343,6 +406,7 @@ class Faults(unittest.TestCase):
         counts = {count for text, count in summary["messages"].items() if text.startswith("http://[::1/")}
         self.assertEqual(counts, {1}, "each tile is tried once")
 
+    @in_parallel.alone
     def test_says_that_a_slow_server_does_not_keep_up(self):
         with fault_proxy.FaultProxy(flights.UPSTREAM, tiles_per_second=10) as proxy:
             status, report = fly(proxy.address, "--require", "full-view=2s,p99=500ms,refined=90%", "--first-view-limit", "3", duration="3")
@@ -353,63 +417,5 @@ class Faults(unittest.TestCase):
         self.assertLessEqual(summary["best_tiles_per_second"], 12)
 
 
-@unittest.skipUnless(shutil.which("openssl"), "needs openssl")
-class Https(unittest.TestCase):
-    def test_loads_the_view_from_a_server_that_it_trusts(self):
-        with tempfile.TemporaryDirectory() as folder:
-            certificate, key = pathlib.Path(folder, "tls.crt"), pathlib.Path(folder, "tls.key")
-            subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
-                            "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate],
-                           check=True, stderr=subprocess.DEVNULL)
-            with Configured(folder, {"tls": {"certificate": str(certificate), "key": str(key)},
-                                     "datasets": [{"name": "jacksboro", "sources": [str(DEM)]}]}) as server:
-                url = f"https://localhost:{server.port}/jacksboro"
-                trusted = {"SSL_CERT_FILE": str(certificate)}
-                for tiles in ("terrain", "3dtiles"):
-                    status, summary = fly_to(url, "--format", tiles, "--forbid-holes", "--require", "full-view=60s,errors=0,refusals=0,holes=0",
-                                             environment=trusted)
-                    self.assertEqual(status, 0, summary)
-                    self.assertGreater(summary["tiles"], 60)
-                    self.assertLessEqual(summary["connections"], 20)
-                # Not trusted, or another name than the certificate's: nothing is loaded, and nothing is tried again.
-                for wrong, environment in ((url, {"SSL_CERT_FILE": "/dev/null"}), (url.replace("localhost", "127.0.0.1"), trusted)):
-                    status, answer = fly_to(wrong, environment=environment)
-                    self.assertEqual(status, 1, answer)
-                    self.assertIn("certificate verify failed", str(answer))
-                    self.assertIn("SSL_CERT_FILE", str(answer))
-                    self.assertEqual(answer["outcomes"]["no_connection"], 1, "asking again does not help")
-                status, summary = fly_to(url.replace("localhost", "127.0.0.1"), "--insecure", "--require", "full-view=60s,errors=0")
-                self.assertEqual(status, 0, summary)
-
-
-class DeeperLevels(unittest.TestCase):
-    """Around `precision` there are levels below those of the sources, and nowhere else: no client finds a hole."""
-
-    def test_have_no_hole_around_them(self):
-        with tempfile.TemporaryDirectory() as folder:
-            box = [[-84.2505, 36.2995], [-84.2495, 36.2995], [-84.2495, 36.3005], [-84.2505, 36.3005], [-84.2505, 36.2995]]
-            edits = {"type": "FeatureCollection", "features": [
-                {"type": "Feature", "properties": {"terrain": {"op": "precision", "error_m": 0.5, "blend_m": 50}},
-                 "geometry": {"type": "Polygon", "coordinates": [box]}}]}
-            pathlib.Path(folder, "edits.geojson").write_text(json.dumps(edits), encoding="utf-8")
-            with Configured(folder, {"datasets": [{"name": "jacksboro", "sources": [str(DEM)], "edits": ["edits.geojson"]},
-                                                  {"name": "plain", "sources": [str(DEM)]}]}) as server:
-                def levels(name):
-                    with urllib.request.urlopen(f"http://127.0.0.1:{server.port}/{name}/layer.json", timeout=60) as reply:
-                        return len(json.load(reply)["available"])
-                self.assertGreater(levels("jacksboro"), levels("plain") + 2)
-                for tiles in ("terrain", "3dtiles"):
-                    urls = pathlib.Path(folder, "urls-" + tiles)
-                    status, summary = fly_to(f"http://127.0.0.1:{server.port}/jacksboro", "--format", tiles, "--forbid-holes", "--urls", urls,
-                                             "--require", "full-view=60s,errors=0,refusals=0,holes=0",
-                                             way=["--circle", "-84.25,36.30,700,250", "--speed", "100"])
-                    self.assertEqual(status, 0, summary)
-                    self.assertGreater(summary["holes"]["examined_frames"], 3)
-                    # /jacksboro/LEVEL/X/Y.terrain, /jacksboro/3dtiles/LEVEL-X-Y/LEVEL_BELOW/X/Y.glb
-                    found = re.findall(r"^/jacksboro/(?:3dtiles/(\d+)-\d+-\d+/)?(\d+)/\d+/\d+\.(?:terrain|glb)", urls.read_text(), re.M)
-                    asked = [int(root or 0) + int(level) for root, level in found]
-                    self.assertGreaterEqual(max(asked), levels("plain") + 1, tiles)
-
-
 if __name__ == "__main__":
-    unittest.main()
+    flights.main()

@@ -14,14 +14,14 @@ import zlib
 
 import fault_proxy
 import flights
+import in_parallel  # flights has set the path
 from flights import BINARY, WAY, fly, fly_to, fly_with_fault
-
-setUpModule, tearDownModule = flights.start_server, flights.stop_server
 
 REST = ["--from", "-84.25,36.3,1500", "--to", "-84.25,36.3,1500"]
 
 
 class Requests(unittest.TestCase):
+    @in_parallel.alone
     def test_each_one_without_an_answer_is_a_timeout(self):
         begun = []
 
@@ -31,16 +31,18 @@ class Requests(unittest.TestCase):
                 return fault_proxy.silence(handler)
             return False
 
-        status, summary = fly_with_fault(ignore_every_fifth, "--timeout", "3", way=["--circle", "-84.25,36.3,1500,8000"], duration="10")
+        status, summary = fly_with_fault(ignore_every_fifth, "--timeout", "3", "--first-view-limit", "4",
+                                         way=["--circle", "-84.25,36.3,1500,8000"], duration="5")
         end = time.monotonic()
         self.assertEqual(status, 0, summary)
+        self.assertGreater(summary["outcomes"]["timeout"], 3)
         self.assertGreaterEqual(summary["outcomes"]["timeout"], sum(at < end - 6 for at in begun))
         self.assertLessEqual(summary["outcomes"]["timeout"], len(begun), "none is sent again without a trace")
         self.assertEqual(summary["outcomes"]["cut"], 0)
 
     def test_that_are_never_answered_are_slow(self):
         with fault_proxy.FaultProxy(flights.UPSTREAM, lambda handler, number: number % 4 == 0 and fault_proxy.silence(handler)) as proxy:
-            status, report = fly(proxy.address, "--first-view-limit", "2", "--require", "errors=0,p99=2s")
+            status, report = fly(proxy.address, "--first-view-limit", "1", "--require", "errors=0,p99=1s", duration="1")
         summary = report["summary"]
         self.assertEqual(status, 1, summary)
         self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [True, False])
@@ -180,7 +182,7 @@ class Replies(unittest.TestCase):
                     waiting = stack.enter_context(socket.socket(socket.AF_INET6))
                     waiting.setblocking(False)
                     waiting.connect_ex(("::1", port))
-                status, report = fly(f"localhost:{port}", "--timeout", "1", "--loads", "2", "--require", "errors=0", way=REST)
+                status, report = fly(f"localhost:{port}", "--timeout", "4", "--loads", "2", "--require", "errors=0", way=REST)
         self.assertEqual(status, 0, report)
 
     def test_may_follow_informational_ones(self):
@@ -257,4 +259,4 @@ class Interrupted(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    flights.main()

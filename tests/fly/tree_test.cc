@@ -71,6 +71,21 @@ TEST(LayerTree, RequestsNoRootThatIsNotAvailable) {
   EXPECT_EQ(east.children.size(), 4U);
 }
 
+TEST(LayerTree, KnowsWhetherThereAreFinerLevels) {
+  const auto document = [](const std::string& finer) {
+    return R"({"tiles":["x"],"available":[[{"startX":0,"startY":0,"endX":1,"endY":0}])" + finer + "]}";
+  };
+  const std::string finer = document(R"(,[],[{"startX":8,"startY":1,"endX":8,"endY":1}])");
+  for (const char* without : {"", ",[]"}) {
+    const auto tree = MakeLayerTree(document(without));
+    ASSERT_TRUE(tree);
+    EXPECT_FALSE((*tree)->has_finer_levels()) << without;
+    ASSERT_TRUE((*tree)->TakeDocument(finer));
+    EXPECT_TRUE((*tree)->has_finer_levels());
+  }
+  EXPECT_TRUE((*MakeLayerTree(finer))->has_finer_levels());
+}
+
 TEST(LayerTree, NotesThatItDoesNotReadTheMetadataOfTiles) {
   const auto note = [](const std::string& members) {
     const auto tree =
@@ -159,6 +174,23 @@ TEST(TilesetTree, GrowsWithItsSubtrees) {
   tree.AddChildren(north_east);
   ASSERT_EQ(north_east.children.size(), 1U);  // the root of the next subtree
   EXPECT_EQ(tree.RequestFor(*north_east.children[0]).uri, "t/2.3.2.subtree?v=aaaa");
+}
+
+TEST(TilesetTree, KnowsWhetherThereAreFinerLevels) {
+  const auto has_finer_levels = [](const std::string& members) {
+    const std::string region = R"("region":[0,-1.5707963267948966,3.141592653589793,1.5707963267948966,0,1])";
+    const auto tree = MakeTilesetTree(R"({"asset":{},"root":{"boundingVolume":{)" + region +
+                                      R"(},"geometricError":9,"content":{"uri":"a.glb"})" + members + "}}");
+    EXPECT_TRUE(tree) << tree.error().message;
+    return tree && (*tree)->has_finer_levels();
+  };
+  const std::string implicit = R"(,"implicitTiling":{"subdivisionScheme":"QUADTREE","subtreeLevels":2,)"
+                               R"("subtrees":{"uri":"a.subtree"},"availableLevels":)";
+  EXPECT_FALSE(has_finer_levels(""));
+  EXPECT_FALSE(has_finer_levels(implicit + "1}"));
+  EXPECT_TRUE(has_finer_levels(implicit + "2}"));
+  EXPECT_TRUE(has_finer_levels(R"(,"children":[{"geometricError":1,"boundingVolume":{"region":[0,0,)"
+                               R"(1.5707963267948966,1.5707963267948966,0,1]}}])"));
 }
 
 TEST(TilesetTree, DoesNotRequestTheContentOfASubtreesRootThatHasNone) {

@@ -244,7 +244,8 @@ class SharedCache(unittest.TestCase):
         redis.ask(b"DEL", keys[0])
         redis.ask(b"RPUSH", keys[0], b"a list")
         self.assertEqual(self.bodies_of(node), self.truth)
-        self.wait_for(lambda: self.figure(node, "damaged_total") == TILES, "nothing was found to be wrong")
+        longer = len(range(4, len(keys), 6))  # than this server keeps: another one may
+        self.wait_for(lambda: self.figure(node, "damaged_total") == TILES - longer, "nothing was found to be wrong")
         self.assertEqual(self.figure(node, "switched_off_total"), 0, "a wrong value is a miss and nothing else")
         self.assertEqual(self.bodies_of(node), self.truth)
         self.wait_for(lambda: [redis.ask(b"GET", key) for key in keys] == values, "wrong values are not replaced")

@@ -290,7 +290,9 @@ TEST_F(HeightsTest, FailuresOfSourcesAreCountedWhateverIsAsked) {
     EXPECT_EQ(Fetch(port(), target).status, 503) << target;
   }
   EXPECT_EQ(Fetch(port(), "/maui/heights").status, 400);
-  EXPECT_NE(Fetch(port(), "/metrics").body.find("\nterrace_source_read_errors_total 2\n"), std::string::npos);
+  EXPECT_TRUE(Eventually([&] {
+    return Fetch(port(), "/metrics").body.find("\nterrace_source_read_errors_total 2\n") != std::string::npos;
+  }));
 }
 
 TEST_F(HeightsTest, IsUnavailableWithoutAReader) {

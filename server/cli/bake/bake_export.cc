@@ -10,6 +10,7 @@
 #include "archive/export.h"
 #include "archive/files/output_file.h"
 #include "bake/place_files.h"
+#include "bake/units.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -55,7 +56,8 @@ Result<void> CheckExportPlace(const std::string& out, const std::string& form) {
 
 Result<void> CheckSizes(const BakeArguments& arguments, const std::vector<bake::Target>& targets) {
   for (const bake::Target& target : targets) {
-    auto fits = archive::CheckManifest(target.place, target.manifest);
+    const std::size_t units = bake::UnitsOf(target.manifest.available).size();
+    auto fits = archive::CheckManifest(target.place, target.manifest, units);
     if (fits && arguments.form == kSingle) fits = archive::CheckSingle(arguments.out, target.manifest);
     if (!fits) return fits;
   }

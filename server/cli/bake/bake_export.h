@@ -17,7 +17,8 @@ namespace terrace::cli {
 // is "." or "..".
 Result<void> CheckExportPlace(const std::string& out, const std::string& form);
 
-// kInvalidArgument: readers would refuse what would be baked into these places, because it states too many tiles.
+// kInvalidArgument: readers would refuse what would be baked into these places, because it states too many tiles and
+// units. The targets have their places and identities.
 Result<void> CheckSizes(const BakeArguments& arguments, const std::vector<bake::Target>& targets);
 
 // Whether the `out` of the arguments was made from `baked` by a process that ended before it had removed `baked`.

@@ -145,13 +145,12 @@ Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& target
 
 // Writes the manifests of a bake of which all units are there.
 Result<void> Finish(std::vector<bake::Target>& targets, const std::vector<bake::UnitReport>& reports,
-                    const std::string& place, const bake::BakeIdentity& identity) {
+                    const std::string& place) {
   for (const bake::UnitReport& report : reports) {
     targets[report.target].manifest.units.push_back(report.entry);
   }
   std::vector<archive::Manifest> manifests;
   for (bake::Target& target : targets) {
-    target.manifest.identity = bake::ToJson(identity);
     if (auto written = archive::WriteManifest(target.place, target.manifest); !written) return written;
     manifests.push_back(target.manifest);
   }
@@ -206,7 +205,7 @@ struct PlacedBake {
 // Bakes units of a job in a queue. Returns the exit code.
 int BakeJob(const PlacedBake& bake, const std::string& worker) {
   const auto finish = [&](const std::vector<bake::UnitReport>& all) {
-    auto finished = Finish(bake.targets, all, bake.place, bake.identity);
+    auto finished = Finish(bake.targets, all, bake.place);
     if (finished) bake::RemoveLocksOfJob(bake.place, bake.arguments.job, worker);
     return finished;
   };
@@ -227,7 +226,7 @@ int BakeJob(const PlacedBake& bake, const std::string& worker) {
 
 // Writes the manifests, and another form than chunks. Returns an exit code.
 int FinishAlone(const PlacedBake& bake, const std::vector<bake::UnitReport>& reports, BakeSummary& summary) {
-  if (const auto finished = Finish(bake.targets, reports, bake.place, bake.identity); !finished) {
+  if (const auto finished = Finish(bake.targets, reports, bake.place); !finished) {
     return Fail(finished.error());
   }
   summary.is_complete = true;
@@ -294,7 +293,10 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const auto is_exported = [&] { return WasExported(place, arguments, identity, dataset.generation); };
   const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out, arguments.form);
   if (!free && !is_exported()) return Fail(free.error());
-  for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
+  for (bake::Target& target : targets) {
+    target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
+    target.manifest.identity = bake::ToJson(identity);
+  }
   if (const auto fits = CheckSizes(arguments, targets); !fits) return Fail(fits.error());
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();

@@ -422,6 +422,8 @@ TEST_F(SourcePolicyTest, OnlyASourceNamesOverviewsElsewhere) {
   fs::remove(dem + ".ovr.aux.xml");
   Write(dem + ".ovr", Vrt(Part((outside_ / "secret.tif").string())));
   expect_refused(dem, "dem.tif.ovr: is a VRT");
+  fs::rename(dem + ".ovr", dem + ".OVR");  // which GDAL opens as well
+  expect_refused(dem, "dem.tif.OVR: is a VRT");
 }
 
 TEST_F(SourcePolicyTest, RemoteNamesStayBelowTheirPrefix) {
