@@ -74,7 +74,7 @@ struct Dataset {
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`
-  std::uint64_t options_hash = 0;  // GenerationOf(dataset, /*heights=*/0), for bakes
+  std::uint64_t options_hash = 0;  // GenerationOf(dataset, /*heights=*/0); only bakes need it
 };
 
 // A hash of three things: `heights` (a fingerprint of the model), all options of the dataset that change bytes, and the

@@ -47,12 +47,12 @@ class TilePipeline {
 
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset; a key that no level has; a quantized-mesh or GLB tile outside availability; heights, a
-  // hillshade, slopes or contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset
-  // without sources, a tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a
-  // source, of the water mask or of the image was replaced, so the dataset has to be opened again. kInvalidArgument: a
-  // member of the request has a value that TileRequest does not permit. kInternal: an encoder failed. kCancelled:
-  // `stop` was requested.
+  // kNotFound: no such dataset; an invalid key (geo::IsValid, or outside the Web Mercator grid); a quantized-mesh or
+  // GLB tile outside availability; heights, a hillshade, slopes or contours deeper than max_mercator_depth; imagery of
+  // a dataset without an image; in a dataset without sources, a tile that its archive lacks. kUnavailable: a source
+  // cannot be read now. kChanged: a file of a source, of the water mask or of the image was replaced, so the dataset
+  // has to be opened again. kInvalidArgument: a member of the request has a value that TileRequest does not permit.
+  // kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // As ElevationModel::ReadPoints. Its preconditions hold for the points of all functions below. kNotFound, here and in
@@ -88,7 +88,7 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
-  CacheStats drawn_meshes() const;  // which does not count hits and misses
+  CacheStats drawn_meshes() const;  // its hits and misses are not counted and stay 0
   CacheStats refinements() const;
 
  private:

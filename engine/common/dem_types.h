@@ -37,9 +37,9 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. An edit states its heights in a datum of its own. Reads in kOrthometric or kSource
-// return them unchanged if they return the heights of all sources that the edit touches, and for kSource also the
-// floor, in the edit's datum. Otherwise they convert them to the ellipsoid and back, which may change them by
+// The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
+// returns them unchanged if the edit's datum is the one in which the read returns all sources that the edit touches
+// and, for kSource, the floor. Otherwise it converts them to the ellipsoid and back, which may change them by
 // millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
@@ -52,8 +52,8 @@ enum class HeightDatum : std::uint8_t {
 class AveragesBudget;
 class CacheFolder;
 
-// The storage of statistics of rasters, and of averages of blocks of samples, from which shallow tiles are read. With a
-// folder, later calls of Open read no raster completely.
+// The storage of statistics of rasters, and of averages of blocks of samples, from which tiles of low levels are read.
+// With a folder, later calls of Open read no raster completely.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
   // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
@@ -66,7 +66,7 @@ struct DemOptions {
   // Metres, > 0: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};
   std::optional<double> floor = {};    // metres above the ellipsoid, used outside the sources, in collars, and with
-                                       // HoleFill::kFloor in holes; default: a height at or below the lowest one
+                                       // HoleFill::kFloor in holes; default: DemInfo::heights.min
   HoleFill voids = HoleFill::kSmooth;  // in holes; other voids follow `max_void_gap` and `floor`
   // Samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled.
   int max_void_gap = 64;

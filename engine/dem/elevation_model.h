@@ -39,8 +39,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled also means that the cache lacks
-  // statistics of a file. A file may lack statistics while another file has an error of Open: with DemOptions::fault,
-  // that function gets the error, and kCancelled is returned; without it, the error is returned.
+  // statistics of a file. If another file has an error of Open as well: DemOptions::fault, if it is set, gets the
+  // error, and kCancelled is returned; if it is not set, the error is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -93,11 +93,12 @@ class ElevationModel {
                                                std::stop_token stop = {}) const;
 
   // Heights at the sources' full resolution, bilinear between samples and rounded to 2^-10 m, in the order of `points`.
-  // NaN outside the sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has
-  // no effect. `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is
-  // void in the source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the
-  // sources, the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A height does
-  // not depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
+  // NaN outside the sources, in collars, and with HoleFill::kFloor in holes. Other voids are filled as in tiles; a
+  // feather has no effect. `filled` has one element for each point, or none; an element is 1 if the sample nearest to
+  // the point is void in the source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut.
+  // Outside the sources, the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A
+  // height does not depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those
+  // of Read.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

@@ -42,12 +42,12 @@ class Imagery {
   // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // Opens an image in 8 or 16 bits per band, with a georeference: grey with or without alpha, a palette, bands that
-  // state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path` is
-  // resolved at each use. `content`: where hashes of large files are stored, and the token that stops Open. kNotFound:
-  // there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference, bands that
-  // are not colours, or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it cannot be
-  // read. kCancelled: stopped.
+  // Opens a georeferenced image in 8 or 16 bits per band. Its bands are grey with or without alpha, a palette, bands
+  // that state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path`
+  // is resolved at each use. `content`: where hashes of large files are stored, and the token that stops Open.
+  // kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference,
+  // bands that are not colours, or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it
+  // cannot be read. kCancelled: stopped.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();

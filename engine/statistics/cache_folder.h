@@ -4,11 +4,11 @@
 // it has opened them. The folder is created when the first file is written. If that fails, models open nevertheless,
 // and problem() has the reason. All other functions are for engine/statistics.
 //
-// Several processes may share it. Before a file grows, the least recently used files are removed until an eighth of
-// the budget is free. Files in use by this process are not removed; if they need more than seven eighths of the budget,
-// they take the last eighth too. Loading a file counts as use, and so do reads of averages, at most once an hour; the
-// time of the last use is the file's modification time. Other files, such as the hashes of file_content.h, are neither
-// counted nor removed: a file is recognized by its name and its first bytes.
+// Several processes may share it. Before a file grows, files that this process does not use are removed, the least
+// recently used first, until an eighth of the budget is free. Files in use may fill the whole budget. Loading a file
+// counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's modification
+// time. Other files, such as the hashes of file_content.h, are neither counted nor removed: a file is recognized by its
+// name and its first bytes.
 #pragma once
 
 #include <chrono>

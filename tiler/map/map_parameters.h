@@ -14,7 +14,7 @@ enum class SlopeStyle : std::uint8_t {
 
 // Members that a TileFormat does not use have their defaults.
 struct MapParameters {
-  // Not kContours. kHillshade and kSlope: not kJpeg.
+  // Unused by kContours. kJpeg is not permitted for kHillshade and kSlope.
   proto::PictureFormat picture = proto::PictureFormat::kPng;
   // kHillshade only.
   std::uint16_t azimuth_deg = 315;               // where the light comes from, clockwise from north, 0 .. 359

@@ -24,8 +24,8 @@ namespace terrace::tiler {
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
-  // Dataset::cache_generation() of the dataset in TilePipeline::datasets(): the pipeline has replaced a generation that
-  // was 0.
+  // Dataset::cache_generation() of the dataset in TilePipeline::datasets(). That of the Dataset that was passed to the
+  // pipeline may still be 0.
   std::uint64_t generation = 0;
   // TileEditsHash (tiler/dataset.h): only of edits that the tile depends on, so that a change of an edit leaves other
   // tiles valid. 0 for a dataset that has only baked tiles.
