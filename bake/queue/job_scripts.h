@@ -66,9 +66,10 @@ return {'ok'}
 // silent for a lease, last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter.
 // Returns the number of deliveries of the unit, and whether other workers were heard of within a lease.
 //
-// A unit is given up because of itself, not because of a worker without room or sources. Therefore, while there is a
-// worker at which it has not failed, it comes to those at which it has failed only after a lease, and such an attempt
-// does not count as the last one. Units that kill their workers are given up all the same.
+// A unit is given up because of itself, not because of a worker without room or sources. Therefore, while there is
+// another worker at which it has not failed, it comes to those at which it has failed only after a lease; and no attempt
+// counts as the last one while there is a worker at which it has not failed. Units that kill their workers are given up
+// all the same.
 inline constexpr const char* kTake = R"lua(
 local worker, lease, attempts = ARGV[2], tonumber(ARGV[3]), tonumber(ARGV[4])
 local now = now_ms()
@@ -87,7 +88,7 @@ local function name_of(message)
 end
 local function failure(name, at)
   local time = redis.pcall('HGET', failed, name .. ' ' .. at)
-  return type(time) == 'string' and time
+  return type(time) == 'table' and now or time  -- a table: the key has another type
 end
 local function is_untried(name)
   for _, other in ipairs(others) do
@@ -115,7 +116,7 @@ repeat
     local deliveries = redis.call('XPENDING', units, 'bakers', message[1], message[1], 1)[1][4]
     local name = name_of(message)
     local time = failure(name, worker)
-    local is_open = redis.pcall('HEXISTS', errors, name) == 1 and is_untried(name)
+    local is_open = redis.pcall('HEXISTS', errors, name) == 1 and (not time or is_untried(name))
     if not (is_open and time and is_recent(time)) then
       if is_open and deliveries <= 3 * attempts then deliveries = math.min(deliveries, attempts - 1) end
       return hand_out(message, deliveries)
@@ -123,7 +124,7 @@ repeat
     redis.call('XCLAIM', units, 'bakers', '-', 0, message[1], 'IDLE', lease, 'RETRYCOUNT', deliveries - 1, 'JUSTID')
     skipped = skipped + 1
   end
-until from == '0-0' or skipped == 50
+until from == '0-0' or skipped == 500
 if redis.call('XLEN', units) > 0 then return {'wait'} end
 if redis.call('XLEN', dead) > 0 then return {'incomplete'} end
 if redis.call('HGET', job, 'state') == 'finished' then return {'finished'} end

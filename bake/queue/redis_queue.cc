@@ -60,12 +60,12 @@ bool RedisQueue::Leave() {
       Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
     }
     finish_.reset();
-    if (!incarnation_.empty()) {
-      outbox_.push_back({ScriptCommand(options_.job, scripts::kLeave, {incarnation_, options_.worker}), {}});
-    }
   }
   const std::lock_guard calls(calls_);
   const bool is_sent = Flush().has_value();
+  if (is_sent && connection_) {  // without it, others wait for this worker for a lease
+    (void)connection_->Call(ScriptCommand(options_.job, scripts::kLeave, {Incarnation(), options_.worker}));
+  }
   const std::lock_guard lock(mutex_);
   const bool is_given_back = is_sent && outbox_.empty();  // what Redis refuses stays in it
   outbox_.clear();

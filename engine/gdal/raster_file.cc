@@ -184,9 +184,7 @@ class BlockEnds {
 
 // Of a GeoTIFF.
 std::uint64_t EndOfBlocks(GDALDataset& dataset, const std::string& path, int bands) {
-  std::error_code unknown;
-  const bool has_own_overviews = !std::filesystem::exists(path + ".ovr", unknown);
-  const bool has_own_mask = !std::filesystem::exists(path + ".msk", unknown);
+  const bool has_own_overviews = SidecarOf(path, ".ovr").empty(), has_own_mask = SidecarOf(path, ".msk").empty();
   BlockEnds ends(dataset);
   for (int number = 1; number <= std::min(bands, dataset.GetRasterCount()); ++number) {
     GDALRasterBand& band = *dataset.GetRasterBand(number);
@@ -224,7 +222,7 @@ Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path)
                      what);
   };
   std::error_code unknown;
-  const std::string mask = path + ".msk", description = path + ".aux.xml";
+  const std::string mask = SidecarOf(path, ".msk"), description = path + ".aux.xml";
   if (std::filesystem::is_regular_file(mask, unknown) && !HasMaskOfItsOwn(dataset)) {
     return refuse(mask, "it cannot be read as a raster, or the metadata INTERNAL_MASK_FLAGS_1 of its dataset is not 2");
   }
@@ -436,8 +434,8 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
   for (const std::string& part : PartsOfVrt(path)) {
     if (known.insert(part).second) files.push_back(part);
     if (IsAllowedRemote(part)) continue;  // each file beside it would take a request
-    for (const std::string_view suffix : kSidecarSuffixes) {
-      if (std::string name = part + std::string(suffix); known.insert(name).second) files.push_back(std::move(name));
+    for (std::string& name : SidecarsOf(part)) {
+      if (known.insert(name).second) files.push_back(std::move(name));
     }
   }
   return files;

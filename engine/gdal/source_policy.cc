@@ -123,10 +123,9 @@ Result<void> CheckOverviewFile(const std::string& path) {
 }
 
 Result<void> CheckOverviewsBeside(const std::string& path) {
-  for (const std::string_view suffix : kSidecarSuffixes) {
-    const std::string file = path + std::string(suffix);
+  for (const std::string& file : SidecarsOf(path)) {
     std::error_code ignored;
-    if (suffix == ".aux.xml" || !fs::is_regular_file(file, ignored)) continue;
+    if (file.ends_with(".xml") || !fs::is_regular_file(file, ignored)) continue;
     if (auto checked = CheckOverviewFile(file); !checked) return checked;
   }
   return {};
@@ -135,8 +134,7 @@ Result<void> CheckOverviewsBeside(const std::string& path) {
 // Files that GDAL opens automatically beside a raster. If they exist, they must be allowed, too.
 Result<void> CheckSidecarNames(const SourcePolicy& policy, const std::string& path) {
   if (policy.roots.empty()) return {};
-  for (const std::string_view suffix : kSidecarSuffixes) {
-    const std::string sidecar = path + std::string(suffix);
+  for (const std::string& sidecar : SidecarsOf(path)) {
     if (::access(sidecar.c_str(), F_OK) != 0) continue;
     if (auto checked = CheckFile(policy, sidecar); !checked) return checked;
   }
@@ -144,6 +142,31 @@ Result<void> CheckSidecarNames(const SourcePolicy& policy, const std::string& pa
 }
 
 }  // namespace
+
+// GDALDefaultOverviews, and GDALFindAssociatedAuxFile of the driver HFA.
+std::vector<std::string> SidecarsOf(const std::string& path) {
+  std::vector<std::string> names;
+  for (const char* suffix :
+       {".aux.xml", ".ovr", ".OVR", ".msk", ".MSK", ".msk.ovr", ".msk.OVR", ".MSK.ovr", ".MSK.OVR", ".aux", ".AUX"}) {
+    names.push_back(path + suffix);
+  }
+  for (const char* extension : {"aux", "AUX"}) {
+    std::string name = fs::path(path).replace_extension(extension);
+    if (name != path) names.push_back(std::move(name));
+  }
+  return names;
+}
+
+std::string SidecarOf(const std::string& path, const std::string& lower) {
+  std::string upper = lower;
+  std::ranges::transform(upper, upper.begin(),
+                         [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+  std::error_code unknown;
+  for (const std::string& suffix : {lower, upper}) {
+    if (fs::exists(path + suffix, unknown)) return path + suffix;
+  }
+  return "";
+}
 
 Result<void> SetSourcePolicy(const SourcePolicy& policy) {
   InitGdal();

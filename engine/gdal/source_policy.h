@@ -5,9 +5,7 @@
 // before they are opened.
 #pragma once
 
-#include <array>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -25,10 +23,11 @@ struct SourcePolicy {
   friend bool operator==(const SourcePolicy&, const SourcePolicy&) = default;
 };
 
-// Files of these names beside a raster are opened by GDAL without being asked (GDALDefaultOverviews). On Linux, GDAL
-// also finds the names in capitals.
-inline constexpr std::array<std::string_view, 11> kSidecarSuffixes = {
-    ".aux.xml", ".ovr", ".OVR", ".msk", ".MSK", ".msk.ovr", ".msk.OVR", ".MSK.ovr", ".MSK.OVR", ".aux", ".AUX"};
+// The names beside a local raster that GDAL opens with it: masks, overviews, descriptions. They need not exist.
+std::vector<std::string> SidecarsOf(const std::string& path);
+// The mask (".msk") or overviews (".ovr") beside a local raster. GDAL tries the name in lower case, then in capitals.
+// Empty: neither exists.
+std::string SidecarOf(const std::string& path, const std::string& lower);
 
 // Sets the policy of the process. The default is an empty policy. Thread-safe, but no source should be opened during
 // the call, because it removes and restores drivers. kInvalidArgument: a root is not a folder, a prefix is not remote,

@@ -96,8 +96,10 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   second.drawn = std::max(second.drawn, record.drawn);
   second.wanted = std::max(second.wanted, record.wanted);
   second.in_flight = std::max(second.in_flight, record.in_flight);
-  second.worst_px = std::max(second.worst_px, record.worst_px);
-  second.worst_stated_px = std::max(second.worst_stated_px, record.worst_stated_px);
+  if (record.drawn > 0) {
+    second.worst_px = std::max(second.worst_px, record.worst_px);
+    second.worst_stated_px = std::max(second.worst_stated_px, record.worst_stated_px);
+  }
   const Coverage coverage = record.coverage.value_or(Coverage());
   const double hole = coverage.rays > 0 ? static_cast<double>(coverage.holes()) / coverage.rays : 0;
   ++totals.frames;

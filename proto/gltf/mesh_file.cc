@@ -200,9 +200,9 @@ GltfMesh GltfOf(const GlbLayout& layout) {
   mesh.accessors = {positions, {.view = 1, .component = layout.index(), .type = "SCALAR", .count = layout.indices}};
   mesh.attributes = {{"POSITION", 0}};
   mesh.indices = 1;
+  mesh.material.emplace();
   if (layout.has_colors) {
     mesh.attributes.emplace_back("COLOR_0", mesh.accessors.size());
-    mesh.material.emplace();
     mesh.accessors.push_back({.view = mesh.views.size(),
                               .component = GltfComponent::kUnsignedShort,
                               .count = layout.vertices,

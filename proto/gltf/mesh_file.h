@@ -8,8 +8,8 @@
 //
 // Colours are sRGB, as in images. PLY stores them as bytes; OBJ stores them after the coordinates as numbers from 0 to
 // 1, with enough digits to restore the bytes. glTF requires linear vertex colours: GLB has COLOR_0 as normalized 16-bit
-// integers, because 8 linear bits are too few for dark colours, and a non-metallic material, because the default
-// material is metallic.
+// integers, because 8 linear bits are too few for dark colours. Each GLB has a non-metallic material, because the
+// default material is metallic, which is dark without a picture to reflect.
 #pragma once
 
 #include <array>

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <set>
-#include <tuple>
 
 #include "engine/core/check.h"
 #include "proto/lattice_angles.h"
@@ -110,20 +108,6 @@ std::vector<bool> FirstEdge(const std::vector<std::uint32_t>& rim, const std::ve
   while (k + 1 < rim.size() && points[rim[k]] == points[rim[k + 1]]) ++k;
   edges[k] = true;
   return edges;
-}
-
-// Merges vertices with equal position and normal to the lowest of their numbers.
-void Weld(const std::vector<GridPoint>& points, const std::vector<geo::Vec3>& normals,
-          std::vector<Triangle>& triangles) {
-  std::map<std::tuple<GridPoint, double, double, double>, std::uint32_t> first;
-  std::vector<std::uint32_t> number(points.size());
-  for (std::uint32_t k = 0; k < points.size(); ++k) {
-    const geo::Vec3& n = normals[k];
-    number[k] = first.emplace(std::tuple(points[k], n.x, n.y, n.z), k).first->second;
-  }
-  for (Triangle& triangle : triangles) {
-    for (std::uint32_t& corner : triangle) corner = number[corner];
-  }
 }
 
 struct GridBox {
@@ -236,7 +220,7 @@ GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, cons
   const auto first_foot = static_cast<std::uint32_t>(points.size());
   HangSkirt(rim, first_foot, hangs, triangles);
   const auto is_merged = [&](const Triangle& t) { return HasMergedCorners(t, all); };
-  bool merges = std::erase_if(triangles, is_merged) > 0;
+  std::erase_if(triangles, is_merged);
   if (triangles.empty()) {
     // glTF needs a triangle: two grid steps tall, which rounding leaves apart, so that it is not seen.
     for (std::size_t k = 0; k < rim.size(); ++k) {
@@ -247,9 +231,8 @@ GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, cons
         all[first_foot + k][axis] = points[rim[k]][axis] + below[axis] - top[axis];
     }
     HangSkirt(rim, first_foot, FirstEdge(rim, points), triangles);
-    merges = std::erase_if(triangles, is_merged) > 0;
+    std::erase_if(triangles, is_merged);
   }
-  if (merges) Weld(all, all_normals, triangles);
 
   VertexOrder order = OrderByFirstUse(triangles, all.size());
   GridMesh grid;

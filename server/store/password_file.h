@@ -7,8 +7,8 @@
 
 namespace terrace::server {
 
-// The first line of the file, without its end ("\n" or "\r\n"). kUnavailable: the file cannot be read, or the line is
-// empty.
+// The first line of the file, without its end ("\n" or "\r\n"). kInvalidArgument: the line has more than 4095 bytes.
+// kUnavailable: the file cannot be read, or the line is empty.
 Result<std::string> ReadPassword(const std::string& file);
 
 }  // namespace terrace::server

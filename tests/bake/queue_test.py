@@ -159,7 +159,7 @@ class Queue(QueueCase):
         right.send_signal(signal.SIGSTOP)  # the other worker is heard of for a lease, and takes nothing
         broken = self.start(place, *box, lease=120, limit=1000)
         until = time.monotonic() + 100
-        while self.redis("XLEN", self.key("units")) > self.redis("HLEN", self.key("errors")) + 1:
+        while not self.redis("HLEN", self.key("errors")) or self.redis("XLEN", self.key("units")) > self.redis("HLEN", self.key("errors")) + 1:
             self.assertLess(time.monotonic(), until)
             time.sleep(0.02)
         # Until it has asked for more in vain.

@@ -40,6 +40,7 @@ class Requests(unittest.TestCase):
         self.assertLessEqual(summary["outcomes"]["timeout"], len(begun), "none is sent again without a trace")
         self.assertEqual(summary["outcomes"]["cut"], 0)
 
+    @in_parallel.alone
     def test_that_are_never_answered_are_slow(self):
         with fault_proxy.FaultProxy(flights.UPSTREAM, lambda handler, number: number % 4 == 0 and fault_proxy.silence(handler)) as proxy:
             status, report = fly(proxy.address, "--first-view-limit", "1", "--require", "errors=0,p99=1s", duration="1")

@@ -250,6 +250,27 @@ TEST(MakeGridMesh, IsClosedAtThePoles) {
   }
 }
 
+// Otherwise a texture is drawn as a fan around the pole.
+TEST(MakeGridMesh, APoleHasTheTextureCoordinatesOfEachColumn) {
+  const GlobalGround ground({2, 1, geo::TileRows(2) - 1}, 32, Scattered(2000));
+  const GridMesh grid =
+      Meshed(ground, RegularMesh(32, 1), GridStep(ground.lattice, 100, PositionWidth::kFloat), 50'000);
+  int at_pole = 0;
+  for (const auto& triangle : grid.triangles) {
+    int first = 32, last = 0;
+    bool touches = false;
+    for (const std::uint32_t k : triangle) {
+      const auto [u, v] = grid.uv[k];
+      first = std::min<int>(first, u), last = std::max<int>(last, u);
+      touches = touches || v == 0;
+    }
+    if (!touches) continue;
+    ++at_pole;
+    EXPECT_LE(last - first, 1);
+  }
+  EXPECT_GE(at_pole, 32);
+}
+
 // Beside a pole the first edges of the rim have no length. Clients expect a triangle.
 TEST(MakeGridMesh, KeepsATriangleOfTilesInHoles) {
   constexpr int kCells = 32;

@@ -261,6 +261,14 @@ TEST(MeshFile, PlyHoldsColorsAsBytesBehindEachPosition) {
   EXPECT_EQ(bytes[data + 108], 3);
 }
 
+// Without one, clients draw the metal of glTF's default material: nearly black.
+TEST(MeshFile, GlbHasAMaterialThatIsNoMetal) {
+  const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, kSquare, kTwo, {}));
+  const Json& primitive = glb.json.at("meshes").at(0).at("primitives").at(0);
+  const Json& material = glb.json.at("materials").at(primitive.at("material").get<std::size_t>());
+  EXPECT_EQ(material.at("pbrMetallicRoughness").at("metallicFactor"), 0);
+}
+
 TEST(MeshFile, GlbColorsAreLinearAndAligned) {
   const Triangles odd = {{0, 1, 2}};  // 6 bytes of indices
   for (const Triangles& triangles : {kTwo, odd}) {

@@ -390,9 +390,11 @@ TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {
   ASSERT_FALSE(linked);
   EXPECT_NE(linked.error().message.find("names overviews elsewhere"), std::string::npos) << linked.error().message;
   fs::remove(root_ / "dem.tif.aux.xml");
-  fs::create_symlink(secret, root_ / "dem.tif.ovr");
-  EXPECT_FALSE(OpenRaster((root_ / "dem.tif").string()));
-  fs::remove(root_ / "dem.tif.ovr");
+  for (const char* beside : {"dem.tif.ovr", "dem.tif.OVR", "dem.tif.MSK", "dem.aux"}) {
+    fs::create_symlink(secret, root_ / beside);
+    EXPECT_FALSE(OpenRaster((root_ / "dem.tif").string())) << beside;
+    fs::remove(root_ / beside);
+  }
   EXPECT_TRUE(OpenRaster((root_ / "dem.tif").string()));
   EXPECT_EQ(watch.Opened(), std::set<std::string>());
 }

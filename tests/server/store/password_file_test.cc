@@ -20,6 +20,8 @@ TEST(ReadPassword, ReturnsTheFirstLineWithoutItsEnd) {
     std::ofstream(file, std::ios::binary) << text;
     EXPECT_FALSE(ReadPassword(file));
   }
+  std::ofstream(file, std::ios::binary) << std::string(5000, 'x') << '\n';
+  EXPECT_EQ(ReadPassword(file).error().code, ErrorCode::kInvalidArgument) << "no password is cut";
   std::remove(file.c_str());
   const auto missing = ReadPassword(file);
   ASSERT_FALSE(missing);
