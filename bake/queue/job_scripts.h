@@ -67,9 +67,9 @@ return {'ok'}
 // Returns the number of deliveries of the unit, and whether other workers were heard of within a lease.
 //
 // A unit is given up because of itself, not because of a worker without room or sources. Therefore, while there is
-// another worker at which it has not failed, it comes to those at which it has failed only after a lease; and no attempt
-// counts as the last one while there is a worker at which it has not failed. Units that kill their workers are given up
-// all the same.
+// another worker at which it has not failed, it comes to those at which it has failed only after a lease; and no
+// attempt counts as the last one while there is a worker at which it has not failed. Units that kill their workers are
+// given up all the same.
 inline constexpr const char* kTake = R"lua(
 local worker, lease, attempts = ARGV[2], tonumber(ARGV[3]), tonumber(ARGV[4])
 local now = now_ms()
