@@ -1,5 +1,6 @@
 """A redis-server of one test, and a client that knows just enough to look into it."""
 import contextlib
+import random
 import shutil
 import socket
 import subprocess
@@ -8,9 +9,12 @@ import time
 
 
 def free_port():
-    with contextlib.closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Below the ports that Linux gives to connections, one of which could take it before it is used."""
+    while True:
+        port = random.randrange(10000, 32768)
+        with contextlib.closing(socket.socket()) as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 class Redis:

@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import json
 import pathlib
+import random
 import re
 import shutil
 import signal
@@ -28,12 +29,14 @@ GIVEN_PORTS = set()
 
 
 def free_port():
-    """Never the same port twice: it may be used later than the next one is asked for."""
+    """Never the same port twice: it may be used later than the next one is asked for. Below the ports that Linux gives to connections, one of
+    which could take it meanwhile."""
     while True:
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            port = s.getsockname()[1]
-        if port not in GIVEN_PORTS:
+        port = random.randrange(10000, 32768)
+        if port in GIVEN_PORTS:
+            continue
+        with socket.socket() as s, contextlib.suppress(OSError):
+            s.bind(("127.0.0.1", port))
             GIVEN_PORTS.add(port)
             return port
 
