@@ -71,7 +71,8 @@ std::string StaleLock(const std::string& place) {
 TEST(Place, OneOfManyTakesOverALock) {
   const test_support::ScratchDirectory scratch;
   const std::string place = scratch.path().string(), stale = StaleLock(place);
-  if (stale.find("unknown") != std::string::npos) GTEST_SKIP() << "it is not known here which processes have ended";
+  // Without what /proc states of processes, the lock stays with its owner.
+  const bool is_known = stale.find("unknown") == std::string::npos;
   constexpr int kRounds = 20, kProcesses = 8;
   for (int round = 0; round < kRounds; ++round) {
     std::ofstream(place + "/bake.lock") << stale;
@@ -95,7 +96,8 @@ TEST(Place, OneOfManyTakesOverALock) {
     }
     for (const int descriptor : {end[0], end[1], taken[0], taken[1]}) ::close(descriptor);
     for (const pid_t process : processes) ::waitpid(process, nullptr, 0);
-    EXPECT_EQ(count, 1);
+    EXPECT_LE(count, 1);
+    EXPECT_TRUE(count == 1 || !is_known);
     fs::remove(place + "/bake.lock");
   }
 }

@@ -212,12 +212,7 @@ TEST_F(HeightsTest, RefusedAndAbandonedBodiesAreCountedForTheirRouteAndDataset) 
   options.config.header_timeout = 400ms;
   options.config.max_locations = 10;
   StartHeights(options);
-  const auto status_of = [&](const std::string& request) {
-    RawClient client(port());
-    client.Send(request);
-    const auto reply = client.Read();
-    return reply ? reply->status : 0;
-  };
+  const auto status_of = [&](const std::string& request) { return StatusOf(port(), request); };
   const std::string large(5000, ' ');
   EXPECT_EQ(status_of(Post("/maui/heights", large)), 413);
   EXPECT_EQ(status_of(Post("/maui/heights", "{}", "Content-Encoding: gzip\r\n")), 415);

@@ -218,12 +218,7 @@ TEST_F(Limits, SlowsDownWhateverIsAsked) {
   options.config.requests_per_second = 0.001;
   options.config.request_burst = 3;
   Start(options);
-  const auto status_of = [&](const std::string& request) {
-    RawClient client(port());
-    client.Send(request);
-    const auto reply = client.Read();
-    return reply ? reply->status : 0;
-  };
+  const auto status_of = [&](const std::string& request) { return StatusOf(port(), request); };
   EXPECT_EQ(status_of("OPTIONS /maui/layer.json HTTP/1.1\r\nHost: x\r\n\r\n"), 204);
   EXPECT_EQ(status_of("DELETE /maui/layer.json HTTP/1.1\r\nHost: x\r\n\r\n"), 405);
   EXPECT_EQ(status_of(Get("/nope")), 404);

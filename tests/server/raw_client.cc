@@ -123,4 +123,10 @@ Reply Fetch(std::uint16_t port, std::string_view target, std::string_view fields
   return client.Read().value_or(Reply());
 }
 
+int StatusOf(std::uint16_t port, std::string_view request) {
+  RawClient client(port);
+  client.Send(request);
+  return client.Read().value_or(Reply()).status;
+}
+
 }  // namespace terrace::server

@@ -57,4 +57,7 @@ std::string Get(std::string_view target, std::string_view fields = "");
 // One request on a new connection.
 Reply Fetch(std::uint16_t port, std::string_view target, std::string_view fields = "");
 
+// The status of the reply to exactly these bytes on a new connection; 0: there is none.
+int StatusOf(std::uint16_t port, std::string_view request);
+
 }  // namespace terrace::server

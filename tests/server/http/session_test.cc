@@ -95,6 +95,15 @@ class Sessions : public testing::Test {
     while (echo_.reports.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
     }
   }
+  // The client closes once its request was admitted.
+  void ExpectReportOfLeaving(Ends& ends) {
+    while (echo_.at_admission.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+    }
+    ends.client.close();
+    RunUntilReported();
+    ASSERT_EQ(echo_.reports.size(), 1u);
+    EXPECT_EQ(echo_.reports[0].status, 499);
+  }
   void End() {
     connections_.AbortAll();
     io_.run_for(std::chrono::seconds(10));
@@ -173,24 +182,14 @@ TEST_F(Sessions, ReportsAClientThatLeavesWhileItWaitsForItsTurn) {
   Ends ends(io_);
   Ask(ends, "late", 1);
   StartSession(std::move(ends.server), context_, "");
-  while (echo_.at_admission.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
-  }
-  ends.client.close();
-  RunUntilReported();
-  ASSERT_EQ(echo_.reports.size(), 1u);
-  EXPECT_EQ(echo_.reports[0].status, 499);
+  ExpectReportOfLeaving(ends);
 }
 
 TEST_F(Sessions, ReportsAClientThatLeavesDuringItsBody) {
   Ends ends(io_);
   asio::write(ends.client, asio::buffer(std::string("POST /late HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\n\r\nb")));
   StartSession(std::move(ends.server), context_, "");
-  while (echo_.at_admission.empty() && io_.run_one_for(std::chrono::seconds(10)) > 0) {
-  }
-  ends.client.close();
-  RunUntilReported();
-  ASSERT_EQ(echo_.reports.size(), 1u);
-  EXPECT_EQ(echo_.reports[0].status, 499);
+  ExpectReportOfLeaving(ends);
   EXPECT_TRUE(echo_.targets.empty()) << "there was nothing to answer";
 }
 
