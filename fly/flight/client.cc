@@ -31,8 +31,7 @@ constexpr double kWorstPixels = 9999;                   // limit: inside a tile'
 constexpr double kFirstPause = 0.5, kLongestPause = 8;  // seconds, where the server names none
 constexpr double kDocumentPause = 2;                    // seconds between two requests for the document
 constexpr int kDamagedAttempts = 2;
-constexpr int kMaxRedirects =
-    5;  // of tiles and subtrees; a document is not redirected, because URIs are relative to it
+constexpr int kMaxRedirects = 5;  // of tiles and subtrees, not of the document, to which their URIs are relative
 
 // 0.75 to 1.25, spread evenly: clients that were refused together do not come back together.
 double Spread(std::uint64_t i) { return 0.75 + 0.5 * std::fmod(static_cast<double>(i) * 0.6180339887498949, 1.0); }
