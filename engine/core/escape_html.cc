@@ -2,7 +2,7 @@
 
 namespace terrace {
 
-std::string EscapeHtml(std::string_view text, bool quotes) {
+std::string EscapeHtml(std::string_view text) {
   std::string escaped;
   escaped.reserve(text.size());
   for (const char c : text) {
@@ -12,7 +12,7 @@ std::string EscapeHtml(std::string_view text, bool quotes) {
       escaped += "&lt;";
     } else if (c == '>') {
       escaped += "&gt;";
-    } else if (c == '"' && quotes) {
+    } else if (c == '"') {
       escaped += "&quot;";
     } else {
       escaped += c;

@@ -6,7 +6,7 @@
 
 namespace terrace {
 
-// Writes &, < and > as entities and, unless `quotes` is false, " too, which must be an entity in attribute values.
-std::string EscapeHtml(std::string_view text, bool quotes = true);
+// Writes &, <, > and " as entities, for text and for values of attributes in double quotes.
+std::string EscapeHtml(std::string_view text);
 
 }  // namespace terrace

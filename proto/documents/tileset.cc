@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/core/escape_html.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "proto/documents/implicit_tree.h"
@@ -203,9 +202,8 @@ std::string EncodeTileset(const TilesetDescription& tileset) {
   json["asset"]["version"] = "1.1";
   if (!tileset.version.empty()) json["asset"]["tilesetVersion"] = tileset.version;
   if (!tileset.attribution.empty()) {
-    // The schema has no place for a credit; this is where CesiumJS looks for one, which it shows as HTML.
-    json["asset"]["extras"]["cesium"]["credits"] =
-        Json::array({{{"html", EscapeHtml(tileset.attribution, /*quotes=*/false)}}});
+    // The schema has no place for a credit; this is where CesiumJS looks for one.
+    json["asset"]["extras"]["cesium"]["credits"] = Json::array({{{"html", tileset.attribution}}});
   }
   json["schema"] = Schema();
   json["geometricError"] = kNothingDrawn;

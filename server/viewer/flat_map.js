@@ -2,6 +2,7 @@
 // colours by height or the dataset's image, shading, and contours. Dragging, wheel or two fingers, arrow keys, plus and minus
 // move it; a click reads a height.
 import { pendingText, UnknownToken } from "/viewer/access.js";
+import { textOf } from "/viewer/attribution.js";
 import { heightColour, niceInterval, waterline } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
@@ -295,7 +296,7 @@ export async function startFlatMap() {
       byId("readout").hidden = true;
       document.title = `${dataset.name} · terrace`;
       if (named() !== dataset.name) history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
-      byId("attribution").textContent = dataset.attribution ?? "";
+      byId("attribution").textContent = textOf(dataset.attribution);
       byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
       byId("message").hidden = true;

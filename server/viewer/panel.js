@@ -1,4 +1,5 @@
 // The controls and the numbers beside the globe. Uses the page's elements, but not CesiumJS.
+import { textOf } from "/viewer/attribution.js";
 import { fractionOfStep, kCoarsest, kFinest, stepOfFraction } from "/viewer/framing.js";
 import { drawLegend } from "/viewer/legend.js";
 import {
@@ -110,7 +111,7 @@ export class Panel {
     document.title = `${name} · terrace`;
     this.heights = heights;
     this.setColouring(byId("colouring").value);
-    byId("attribution").textContent = [attribution, imagery?.attribution, "drawn with CesiumJS"].filter(Boolean).join(" · ");
+    byId("attribution").textContent = [textOf(attribution), textOf(imagery?.attribution), "drawn with CesiumJS"].filter(Boolean).join(" · ");
   }
 
   setColouring(name) {

@@ -30,7 +30,8 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     execFileSync('gdal_translate', ['-q', '-ot', 'Byte', '-b', '1', '-b', '1', '-b', '1', '-scale_1', '0', '9999', '255', '255',
                                     '-scale_2', '0', '9999', '0', '0', '-scale_3', '0', '9999', '255', '255', '-colorinterp', 'red,green,blue',
                                     '-a_nodata', 'none', hills, image]);
-    fs.writeFileSync(config, JSON.stringify({ datasets: [{ name: 'hills', sources: [hills], imagery: { image } }] }));
+    fs.writeFileSync(config, JSON.stringify({ datasets: [{ name: 'hills', sources: [hills], attribution: 'A &amp; <a href="https://example.org">B</a>',
+                                                          imagery: { image, attribution: 'C' } }] }));
     server = await serve('--config', config);
     browser = await launch();
   });
@@ -63,6 +64,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     assert.ok(await shareOfMagenta(page) > 0.3, `${await shareOfMagenta(page)}`);
     assert.ok(asked.some((url) => /^\/hills\/imagery\/geodetic\/\d+\/\d+\/\d+\.webp$/.test(url)), asked.join(' '));
     await assertAccessible(page, 'layers');
+    assert.equal(await page.locator('#attribution').textContent(), 'A & B · C · drawn with CesiumJS');
     const boxes = await page.evaluate(async () => {
       const { addImagery } = await import('/viewer/imagery.js');
       const layers = [];
@@ -87,6 +89,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     await page.locator('#globe canvas').waitFor(kWait);
     assert.ok(await page.locator('#imagery').isVisible());
     assert.ok(await page.locator('#wireframe').isHidden());
+    assert.equal(await page.locator('#attribution').textContent(), 'A & B');
     const pixels = () => page.evaluate(() => {
       const canvas = document.querySelector('#globe canvas');
       return Array.from(new Uint32Array(canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.buffer));

@@ -18,7 +18,7 @@ constexpr HeightSpan kHeights{-1500, 3055.5};
 
 TilesetDescription Maui() {
   TilesetDescription tileset;
-  tileset.attribution = "© a <survey> & \"Co\"";
+  tileset.attribution = "© <a href=\"https://example.org\">a survey</a>";
   tileset.roots = {{{7, 16, 78}, 8}};
   tileset.heights = [](const geo::TileKey&) { return kHeights; };
   return tileset;
@@ -249,10 +249,10 @@ TEST(Tileset, QueryGoesToTheContentsAlone) {
   EXPECT_EQ(root.at("implicitTiling").at("subtrees").at("uri"), "3dtiles/7-16-78/{level}/{x}/{y}.4.subtree");
 }
 
-TEST(Tileset, CreditIsWhereCesiumLooksAndNoMarkup) {
+TEST(Tileset, CreditIsWhereCesiumLooks) {
   const Json json = Json::parse(EncodeTileset(Maui()));
   EXPECT_EQ(json.at("asset").at("extras").at("cesium").at("credits").at(0).at("html"),
-            "© a &lt;survey&gt; &amp; \"Co\"");
+            "© <a href=\"https://example.org\">a survey</a>");
   TilesetDescription silent = Maui();
   silent.attribution.clear();
   EXPECT_FALSE(Json::parse(EncodeTileset(silent)).at("asset").contains("extras"));

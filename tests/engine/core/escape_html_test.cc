@@ -11,7 +11,5 @@ TEST(EscapeHtml, LeavesNoMarkup) {
   EXPECT_EQ(EscapeHtml("Zürich, 46° N"), "Zürich, 46° N");
 }
 
-TEST(EscapeHtml, KeepsQuotesOfTextBetweenTags) { EXPECT_EQ(EscapeHtml("\"a\" < b", /*quotes=*/false), "\"a\" &lt; b"); }
-
 }  // namespace
 }  // namespace terrace
