@@ -31,6 +31,8 @@ auto CatchErrors(const Work& work) -> decltype(work()) {
     return work();
   } catch (const std::bad_alloc&) {
     return tl::unexpected(Error{ErrorCode::kUnavailable, "no memory"});  // short: needs none itself
+  } catch (const ThrownError& thrown) {
+    return tl::unexpected(thrown.error());
   } catch (const std::exception& thrown) {
     return MakeError(ErrorCode::kUnavailable, "{}", thrown.what());
   }

@@ -57,7 +57,7 @@ class TerrainApplication final : public Application, public ServerStatus {
   // Problems by dataset; "" is the configuration.
   void SetProblems(std::map<std::string, std::string> problems);
 
-  // From the end of a request's head to its deadline: option request_deadline_s.
+  // As SessionContext::request_time_limit.
   const std::atomic<std::chrono::milliseconds>& request_time_limit() const { return request_time_limit_; }
   // Never null; without datasets until the first catalog has come.
   CatalogPtr catalog() const { return Current()->catalog; }

@@ -45,10 +45,10 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Returns when the server is listening. Requests wait for the first Replace, at most for request_deadline; /livez,
-  // /metrics and /readyz ("opening") answer meanwhile. kInvalidArgument: a trusted proxy, the certificate or its key
-  // cannot be used. kUnavailable: the server cannot listen on the address, read the viewer or write the access log.
-  // Messages name the remedy.
+  // Returns when the server is listening. Requests wait for the first Replace, at most for request_deadline;
+  // those that need no catalog, such as /livez, /metrics and /readyz, are answered meanwhile. kInvalidArgument: a
+  // trusted proxy, the certificate or its key cannot be used. kUnavailable: the server cannot listen on the address,
+  // read the viewer or write the access log. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(ServerOptions options);
 
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all

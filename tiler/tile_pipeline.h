@@ -38,7 +38,7 @@ class TilePipeline {
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
   // Uses a cache that other pipelines may share, and that may outlive this one (tiler/store/refinement_cache.h, which
-  // is not installed).
+  // is not installed). Not null.
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
   virtual ~TilePipeline();
@@ -60,16 +60,18 @@ class TilePipeline {
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
-  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up; NaN where ReadPoints
-  // returns NaN. Errors: those of ReadPoints.
+  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up. They are differences over
+  // half the finest source's spacing on each side. NaN where the point has no height, or where on one axis both places
+  // beside it have none. Errors: those of ReadPoints.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
   // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
   // level has no tile, the mesh of its deepest available ancestor is read. `normals`: also normals. Keeps meshes
-  // between calls. kInvalidArgument: the dataset has no such level, or the points lie in more than 64 tiles. Other
-  // errors: those of Build.
+  // between calls. kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in tiles
+  // whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and its archive has no quantized-mesh
+  // tiles, or the surface is that of kGlb. Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
@@ -77,7 +79,8 @@ class TilePipeline {
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
   // ElevationModel::LookAlong. kInvalidArgument: together the rays cross more than 2 x 10^8 samples; over
   // the sources' surface, an edit changes the ground below a ray or near it (ElevationModel::LookAlong); over a drawn
-  // one, they cross more than 64 tiles. Other errors: those of ReadPoints and ReadDrawnPoints.
+  // one, they cross more than 64 tiles, or tiles whose meshes take more than 256 MiB. Other errors: those of ReadPoints
+  // and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

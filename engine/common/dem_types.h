@@ -38,9 +38,8 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
-// returns them unchanged if the edit's datum is the one in which the read returns all sources that the edit touches
-// and, for kSource, the floor. Otherwise it converts them to the ellipsoid and back, which may change them by
-// millimetres.
+// returns them as stated if it returns all sources that the edit touches (for kSource also the floor) in this datum.
+// Otherwise they are converted to the ellipsoid and back, which may change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
@@ -65,15 +64,16 @@ struct DemOptions {
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume; > 0
   // Metres, > 0: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};
-  std::optional<double> floor = {};    // metres above the ellipsoid, used outside the sources, in collars, and with
-                                       // HoleFill::kFloor in holes; default: DemInfo::heights.min
+  // Metres above the ellipsoid, -99,998 .. 99,998; used outside the sources, in collars, and with HoleFill::kFloor in
+  // holes. Default: DemInfo::heights.min as it is without edits.
+  std::optional<double> floor = {};
   HoleFill voids = HoleFill::kSmooth;  // in holes; other voids follow `max_void_gap` and `floor`
   // Samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled.
   int max_void_gap = 64;
   RasterCache cache = {};
   std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
-  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids a source is blended with the sources below.
-  // 0: hard edges.
+  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, and at most 256 samples, a source is
+  // blended with the sources below. 0: hard edges.
   double feather = 0;
   // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
   // equal shares. The share falls if a raster has to be read again. May be empty.
@@ -153,14 +153,14 @@ struct RasterInfo {
   std::string heights_doubted;               // why they may not be metres, with the remedy; empty: plausible
   HeightRange ellipsoidal;                   // contains all ellipsoidal heights
   std::uint64_t valid_samples = 0, void_samples = 0;
-  std::uint64_t enclosed_samples = 0;  // of voids with data all around them
-  std::optional<double> nodata;
-  std::string found_voids;  // detected nodata values, for people; empty: none
-  std::vector<int> overview_factors;
-  std::vector<std::string> warnings;  // what else people should know, each with the remedy
-  std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none is ignored
+  std::uint64_t enclosed_samples = 0;  // of voids with data all around them; 0 also if they were not counted
+  std::optional<double> nodata;        // raw value that the file declares, or that its type implies
+  std::string found_voids;             // detected nodata values, for people; empty: none
+  std::vector<int> overview_factors;   // of the overviews that are read
+  std::vector<std::string> warnings;   // what else people should know, each with the remedy
+  std::string overviews_unused;        // why overviews are ignored, with the remedy; empty: none is ignored
   // Why the pass over all samples decodes blocks many times, with the remedy; empty: it does not.
-  std::string wide_blocks;
+  std::string blocks_too_wide;
   std::string transform;  // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   // Each of the finest stored averages covers N x N samples; this is N. 0: none are stored.
   int min_kept_factor = 0;
@@ -172,8 +172,8 @@ struct RasterInfo {
 struct DemInfo {
   std::vector<RasterInfo> sources;  // in order of precedence
   GeoBounds bounds;
-  HeightRange heights;  // contains all valid samples, metres above the ellipsoid
-  double floor = 0;
+  HeightRange heights;  // contains all valid samples and edited heights, metres above the ellipsoid
+  double floor = 0;     // metres above the ellipsoid
   int max_level = 0;
   int max_source_level = 0;  // what max_level would be without edits, which may add levels
   // The first depth, at least 1, whose Web Mercator grid (256 << depth pixels around the Earth) is as fine as the
@@ -184,7 +184,7 @@ struct DemInfo {
   std::vector<std::string> left_out;
 };
 
-// The blocks of samples that the process keeps for points and lines of sight, for all sources. Their voids are filled.
+// The blocks of samples that the process keeps for points and lines of sight, for all sources.
 struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };

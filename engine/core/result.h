@@ -1,11 +1,13 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
 // Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
-// errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Only
-// std::bad_alloc passes: functions that read, build or encode may throw it.
+// errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Functions that
+// read, build or encode may throw two exceptions: std::bad_alloc, and ThrownError where the statistics of a source that
+// memory does not hold can no longer be read from the cache folder or computed again.
 #pragma once
 
 #include <fmt/core.h>
 
+#include <exception>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -31,6 +33,17 @@ std::string_view ToString(ErrorCode code);
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
   std::string message;  // one sentence for people: the thing, the place and the remedy; no trailing full stop
+};
+
+// An Error as an exception.
+class ThrownError : public std::exception {
+ public:
+  explicit ThrownError(Error error) : error_(std::move(error)) {}
+  const Error& error() const { return error_; }
+  const char* what() const noexcept override { return error_.message.c_str(); }
+
+ private:
+  Error error_;
 };
 
 template <typename T>

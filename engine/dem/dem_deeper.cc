@@ -24,11 +24,11 @@ void ElevationModel::Impl::AddDeeperLevels(double error_fraction) {
   if (finer.empty()) return;
   const std::vector<std::vector<geo::TileRange>> added = AddTiles(available, finer);
   if (std::ranges::all_of(added, [](const auto& tiles) { return tiles.empty(); })) return;
-  above_added.resize(added.size());
+  ancestors_of_added.resize(added.size());
   for (std::size_t level = added.size() - 1; level > 0; --level) {
-    std::vector<geo::TileRange>& parents = above_added[level - 1];
+    std::vector<geo::TileRange>& parents = ancestors_of_added[level - 1];
     std::vector<geo::TileRange> children = added[level];
-    children.insert(children.end(), above_added[level].begin(), above_added[level].end());
+    children.insert(children.end(), ancestors_of_added[level].begin(), ancestors_of_added[level].end());
     for (const geo::TileRange& range : children) {
       parents.push_back({range.start_x >> 1, range.start_y >> 1, range.end_x >> 1, range.end_y >> 1});
     }
@@ -41,8 +41,8 @@ void ElevationModel::Impl::AddDeeperLevels(double error_fraction) {
 }
 
 std::uint64_t TileEdits::DeeperTilesHash(const geo::TileKey& key) const {
-  if (!geo::IsValid(key) || key.level >= static_cast<int>(model_.above_added.size())) return 0;
-  const auto& touched = model_.above_added[static_cast<std::size_t>(key.level)];
+  if (!geo::IsValid(key) || key.level >= static_cast<int>(model_.ancestors_of_added.size())) return 0;
+  const auto& touched = model_.ancestors_of_added[static_cast<std::size_t>(key.level)];
   if (!geo::Contains(touched, key)) return 0;
   const ElevationModel::Impl::HashKey memo_key = {key.level, key.x, key.y, -1, -1};
   if (const auto known = model_.KnownHash(memo_key)) return *known;

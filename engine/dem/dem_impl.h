@@ -67,7 +67,8 @@ class ElevationModel::Impl {
   Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
   // Of an edit with orthometric heights. dem_edit_datum.cc.
   Result<std::string> AddUndulations(Edit& edit) const;
-  // Whether all heights in a datum that an edit may reach count from a geoid (GeoidIn). dem_edit_datum.cc.
+  // Whether reads in `datum` return all heights that an edit with this reach may touch above `geoid` (GeoidIn).
+  // dem_edit_datum.cc.
   bool CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const;
   // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.
@@ -105,8 +106,8 @@ class ElevationModel::Impl {
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
-  std::vector<std::vector<geo::TileRange>> above_added;  // the tiles above those that edits added; empty: none
-  float floor = 0;                                       // above the ellipsoid
+  std::vector<std::vector<geo::TileRange>> ancestors_of_added;  // of the tiles that edits added; empty: none
+  float floor = 0;                                              // metres above the ellipsoid
   // Undulations of the last raster grid that refers to a geoid, for the whole Earth. Null: no raster grid does.
   std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;

@@ -39,8 +39,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled also means that the cache lacks
-  // statistics of a file. If another file has an error of Open as well: DemOptions::fault, if it is set, gets the
-  // error, and kCancelled is returned; if it is not set, the error is returned.
+  // statistics of a file. An error of another file is returned instead, unless DemOptions::fault is set: then fault
+  // gets it, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -62,8 +62,8 @@ class ElevationModel {
   const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
-  // A range that contains all heights of the tile's samples, without the halo. Reads no samples. Accepts any valid key;
-  // tiles outside all sources hold only the floor.
+  // A range that contains all heights of the tile's samples, without the halo, from the statistics alone. Accepts any
+  // valid key; tiles outside all sources hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid. Precondition: a valid key.
@@ -93,21 +93,21 @@ class ElevationModel {
                                                std::stop_token stop = {}) const;
 
   // Heights at the sources' full resolution, bilinear between samples and rounded to 2^-10 m, in the order of `points`.
-  // NaN outside the sources, in collars, and with HoleFill::kFloor in holes. Other voids are filled as in tiles; a
-  // feather has no effect. `filled` has one element for each point, or none; an element is 1 if the sample nearest to
-  // the point is void in the source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut.
-  // Outside the sources, the height that an edit sets is returned if `datum` is kEllipsoid, and NaN in other datums. A
-  // height does not depend on the other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those
-  // of Read.
+  // NaN where no source has a height: outside the sources, in collars, and with HoleFill::kFloor in holes. Other voids
+  // are filled as in tiles; a feather has no effect. `filled` has one element for each point, or none; an element is 1
+  // if the sample nearest to the point is void in the source that gives the height, and 0 elsewhere. Edits apply: NaN
+  // in holes that they cut. Where no source has a height, the height that an edit sets is returned if `datum` is
+  // kEllipsoid, and NaN in other datums. A height does not depend on the other points. Preconditions: finite
+  // longitudes, latitudes in -90 .. 90. Errors: those of Read. kInvalidArgument: kOrthometric needs EGM96, and PROJ
+  // lacks its grid.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
 
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit changes heights or cuts a hole, and the
-  // box around it lies below a ray or near it. A box at a horizontal distance of more than 125 m from the ray never
-  // causes this error.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a ray passes above the box around an edit that
+  // changes heights or cuts a hole, or perhaps up to 125 m beside this box.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

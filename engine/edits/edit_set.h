@@ -72,7 +72,7 @@ class EditSet {
   HeightRange Extended(HeightRange range, std::span<const std::size_t> which,
                        const std::function<HeightRange(const Edit&)>& replacement) const;
 
-  // What the edits ask of the mesh of a window of nodes without a halo (engine/common/dem_types.h). Empty members if
+  // What the edits ask of the mesh of a window of nodes without a halo (engine/edits/edit_effects.h). Empty members if
   // they ask nothing.
   MeshDemands DemandsOf(const geo::Lattice& lattice, const NodeWindow& window,
                         std::span<const std::size_t> which) const;

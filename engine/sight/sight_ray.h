@@ -29,9 +29,10 @@ struct SightAnswer {
   // The smallest vertical distance from the surface up to the ray, its ends included; negative if the ray passes below.
   // NaN: there is no surface anywhere along the ray.
   double clearance_m = std::numeric_limits<double>::quiet_NaN();
-  double clearance_at = 0;           // as a share of the ray's length
-  std::optional<double> blocked_at;  // the first place below the surface, as a share of the ray's length
-  bool has_gaps = false;             // parts of the ray are above places without a height
+  double clearance_at = 0;  // as a share of the ray's length
+  std::optional<double>
+      blocked_at;         // the first place more than kSightTolerance below the surface, a share of the length
+  bool has_gaps = false;  // parts of the ray are above places without a height
 };
 
 // Metres. A ray that touches the ground, as from a point that was read from the same surface, is not blocked.
@@ -40,7 +41,7 @@ inline constexpr double kSightTolerance = 1e-3;
 // ground that are farther apart never see each other.
 inline constexpr double kMaxSightLength = 3e6;
 
-// What is known of a ray so far.
+// What is known of a ray so far. Used by this library only.
 class SightSearch {
  public:
   // Whether a part of the ray that begins at `start` and has at least this clearance can be skipped.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -240,7 +239,7 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   if (averages_) info_.min_kept_factor = averages_->min_factor();
   if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
   info_.found_voids = prepared.detected.text;
-  info_.wide_blocks = DescribeWideBlocks(dataset);
+  info_.blocks_too_wide = DescribeWideBlocks(dataset);
   info_.datum_in_use = vertical_.name;
   if (vertical_.geoid) info_.vertical_operation = vertical_.geoid->description();
   info_.spacing_m = spacing_.finer;
@@ -290,10 +289,16 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
 }
 
 StatisticsPtr RasterSource::statistics() const {
+  auto found = FindStatistics();
+  if (!found) throw ThrownError(std::move(found.error()));
+  return *std::move(found);
+}
+
+Result<StatisticsPtr> RasterSource::FindStatistics() const {
   if (kept_) return kept_;
   if (auto known = paging_->pages->paged.Find(this)) return known;
   auto statistics = ReadStatistics();
-  if (!statistics) throw std::runtime_error(statistics.error().message);
+  if (!statistics) return tl::unexpected(std::move(statistics.error()));
   auto shared = std::make_shared<const RasterStatistics>(*std::move(statistics));
   paging_->pages->paged.Insert(this, shared, shared->bytes());
   return shared;
@@ -335,7 +340,9 @@ Result<std::vector<float>> RasterSource::ReadAverages(int factor, const GridWind
   // Uses memory and the cache file only if the files have not changed since they were prepared.
   if (factor >= kLargestMeasuredFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    if (const StatisticsPtr known = statistics(); known->coarse.Has(factor)) return known->coarse.Read(factor, window);
+    const auto known = FindStatistics();
+    if (!known) return tl::unexpected(known.error());
+    if ((*known)->coarse.Has(factor)) return (*known)->coarse.Read(factor, window);
   }
   if (memory_averages_ && memory_averages_->Has(factor)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());

@@ -68,8 +68,8 @@ class RasterSource {
   // Means of the valid samples of the first and the last row.
   const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
 
-  // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
-  // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
+  // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws ThrownError if
+  // they can be neither read nor computed again, for example because the raster was removed.
   StatisticsPtr statistics() const;
   // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
   BlockRange RangeIn(double west, double north, double east, double south) const;
@@ -100,6 +100,7 @@ class RasterSource {
   void FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared);
   void LogOpened(GDALDataset& dataset) const;
   void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
+  Result<StatisticsPtr> FindStatistics() const;
   Result<RasterStatistics> ReadStatistics() const;
   void LoseCache(const Error& error) const;
 

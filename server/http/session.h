@@ -39,7 +39,8 @@ struct SessionContext {
   Application* application = nullptr;
   ConnectionSet* connections = nullptr;
   TransferBudget* transfers = nullptr;
-  // From the end of a request's head to Request::deadline: option request_deadline_s.
+  // From the end of a request's head to Request::deadline, which a body extends by the time that it takes to arrive:
+  // option request_deadline_s.
   const std::atomic<std::chrono::milliseconds>* request_time_limit = nullptr;
   CorsPolicy cors;
   const TlsContext* tls = nullptr;  // null: plain HTTP

@@ -28,7 +28,10 @@ void Wake(WaiterPtr waiter) {
 
 Error FailureOf(std::string_view name, const std::exception& thrown) {
   const bool is_memory_short = dynamic_cast<const std::bad_alloc*>(&thrown) != nullptr;
-  const ErrorCode code = is_memory_short ? ErrorCode::kOverloaded : ErrorCode::kUnavailable;
+  const auto* const error = dynamic_cast<const ThrownError*>(&thrown);
+  const ErrorCode code = is_memory_short    ? ErrorCode::kOverloaded
+                         : error == nullptr ? ErrorCode::kUnavailable
+                                            : error->error().code;
   try {
     // Logged here, because the log leaves out other refusals under load.
     if (is_memory_short)

@@ -44,7 +44,7 @@ template <typename T>
 using Work = std::function<Result<T>(std::stop_token)>;
 
 // The error of an exception that the work `name` has thrown. kOverloaded: memory is short, which is also logged.
-// kUnavailable: another exception, such as that of RasterSource::statistics. Never throws.
+// ThrownError: its code. kUnavailable: another exception. Never throws.
 Error FailureOf(std::string_view name, const std::exception& thrown);
 // kOverloaded: the job of the work `name` was dropped for others. Never throws.
 Error DroppedJobError(std::string_view name);

@@ -76,7 +76,7 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
   const double step = lattice_.StepDegrees(), radians = geo::ToRadians(step);
   std::vector<double> latitudes;
   for (int j = 0; j < window_.rows; ++j) latitudes.push_back(At(0, j).latitude);
-  options.curvature = {EastSteps(latitudes, step), radians * geo::kLargestRadius * radians * geo::kLargestRadius,
+  options.curvature = {SquaredEastSteps(latitudes, step), radians * geo::kLargestRadius * radians * geo::kLargestRadius,
                        geo::kSmallestRadius};
   for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
     const bool is_parallel = side == tin::Side::kSouth || side == tin::Side::kNorth;

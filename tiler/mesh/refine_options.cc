@@ -32,7 +32,7 @@ tin::Curvature MakeCurvature(const proto::TileSamples& samples) {
   std::vector<double> latitudes;
   for (int j = 0; j <= samples.cells(); ++j) latitudes.push_back(samples.Latitude(j));
   const double north = geo::ToRadians(step) * geo::kLargestRadius;
-  return {EastSteps(latitudes, step), north * north, geo::kSmallestRadius};
+  return {SquaredEastSteps(latitudes, step), north * north, geo::kSmallestRadius};
 }
 
 // Triangles with a sagitta above half of the error leave too little of the error for relief. Therefore the next finer
@@ -73,7 +73,7 @@ double PositionRounding(const proto::TileSamples& samples, tin::Side side) {
 
 // Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the
 // widest row and decrease after it, as Curvature requires.
-std::vector<double> EastSteps(std::span<const double> latitudes, double step) {
+std::vector<double> SquaredEastSteps(std::span<const double> latitudes, double step) {
   std::vector<double> east_m2;
   for (const geo::SinCos& latitude : geo::RoundedSinCosOf(latitudes)) {
     const double east = geo::MetresPerDegreeEast(latitude) * step;

@@ -14,8 +14,8 @@
 
 namespace terrace::tiler {
 
-// Curvature::east_m2 of rows at these latitudes; `step`: degrees between columns.
-std::vector<double> EastSteps(std::span<const double> latitudes, double step);
+// Squares of metres between columns, for rows at these latitudes (Curvature::east_m2). `step`: degrees.
+std::vector<double> SquaredEastSteps(std::span<const double> latitudes, double step);
 
 // `finest`: height steps of the edges for the smallest error (MakeEdgeSteps).
 tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& finest);

@@ -14,7 +14,8 @@ namespace terrace::tiler {
 // Rounds the vertices of a mesh as its format does, and measures the decoded mesh.
 using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
-// Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. Returns the
+// Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. If an edge passes
+// between neighbouring samples (TileError::is_cut_through), makes the mesh Delaunay and goes on. Returns the
 // measurement of the final mesh. The largest error exceeds the bound only
 // - at vertices whose rounded positions are not those of their samples, if all neighbouring samples are vertices: by
 //   the change of the ground over that offset;

@@ -49,9 +49,10 @@ Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::T
                                 double wanted_error_m, const std::stop_token& stop);
 
 // ReplayMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
-// run with RefineOptionsOf to this error or a finer one; none: that takes more vertices than the format allows. In that
-// case the inside is coarser than requested and the edges are not. If quantization would flip a triangle, the tile is
+// run with RefineOptionsOf to this error or a finer one; none: such a run needs more vertices than the format allows.
+// Then the inside is coarser than requested and the edges are not. If quantization would flip a triangle, the tile is
 // refined anew by the Delaunay criterion, without drop pass and WithInnerVertices. kCancelled: stopped.
+// kInternal: even so a triangle is flipped.
 Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
                             const std::optional<tin::Refinement>& refinement, const MeshOptions& mesh_options,
                             double wanted_error_m, const std::stop_token& stop);

@@ -31,7 +31,7 @@ using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 
 class TileTiers {
  public:
-  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; none is null.
+  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; no null pointers.
   // `write_header_lines` is called once for each tile that is built or found in a store, and its lines are cached with
   // the tile; null: they stay empty.
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
@@ -48,7 +48,7 @@ class TileTiers {
   // How many tiles were erased.
   struct Erased {
     std::size_t memory = 0;
-    std::vector<std::pair<const char*, std::size_t>> stores;  // by the store's name
+    std::vector<std::pair<const char*, std::size_t>> stores;  // with the store's name; the slowest first
   };
   // Erases the selected tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors:
   // those of the stores. If one fails, the others are erased nevertheless.

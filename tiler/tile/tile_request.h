@@ -48,8 +48,8 @@ struct TileRequest {
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
-  // Pixels along an edge: kHeightPng, and map layers except kContours. The depth of
-  // these pixels (ElevationModel::ReadMercator) is key.level if there are 256, and key.level + 1 if there are 512.
+  // Pixels along an edge: kHeightPng, and map layers except kContours. In Web Mercator formats their depth
+  // (ElevationModel::ReadMercator) is key.level if there are 256, and key.level + 1 if there are 512.
   int side_px = kSidesPx[0];
   MapParameters map;  // IsMapLayer(format)
 

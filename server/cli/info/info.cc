@@ -66,7 +66,7 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   }
   if (!info.heights_doubted.empty()) advice.push_back(info.heights_doubted);
   std::ranges::copy(info.warnings, std::back_inserter(advice));
-  if (!info.wide_blocks.empty()) advice.push_back(info.wide_blocks);
+  if (!info.blocks_too_wide.empty()) advice.push_back(info.blocks_too_wide);
   if (info.driver == "VRT") {
     advice.push_back(
         "a VRT, which names other files: 'terrace serve' takes it where allowed_drivers of its configuration lists "

@@ -177,6 +177,10 @@ TEST(WorkerPool, RunTellsAShortageOfMemoryFromOtherExceptions) {
       RunAside<int>(pool, [](std::stop_token) -> Result<int> { throw std::out_of_range("index 7"); }).get();
   EXPECT_EQ(failed.error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(failed.error().message, "work for one request: index 7");
+  const auto changed = RunAside<int>(pool, [](std::stop_token) -> Result<int> {
+                         throw ThrownError({ErrorCode::kChanged, "a.tif: was removed"});
+                       }).get();
+  EXPECT_EQ(changed.error().code, ErrorCode::kChanged) << "the server opens the sources again";
 }
 
 // Waits until it is asked to stop, at most ten seconds.
