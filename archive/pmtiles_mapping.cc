@@ -9,7 +9,6 @@
 #include "archive/manifest_json.h"
 #include "engine/core/names.h"
 #include "proto/documents/picture_names.h"
-#include "proto/documents/tile_json.h"
 #include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {

@@ -5,9 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "archive/manifest.h"
 #include "archive/pmtiles/file_summary.h"
-#include "archive/unit_name.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"

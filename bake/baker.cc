@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "archive/unit_name.h"
 #include "bake/bake_request.h"
 #include "bake/copy_unit.h"
 #include "bake/queue/local_queue.h"

@@ -1,9 +1,7 @@
 // A list of one-degree cells, for planning a bake before its sources are downloaded.
 #pragma once
 
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "bake/units.h"
 #include "engine/core/result.h"

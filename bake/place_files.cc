@@ -29,10 +29,15 @@ std::string HostName() {
   return name.data();
 }
 
+namespace {
+
+// The name of this process's temporary file, which is renamed to `file`.
 std::string OwnPartial(const std::string& file) {
   static const unsigned random = std::random_device()();  // processes of containers may have the same host and number
   return fmt::format("{}.{}.{}.{:08x}.partial", file, HostName(), ::getpid(), random);
 }
+
+}  // namespace
 
 Result<bool> Exists(const fs::path& file) {
   if (!archive::IsBucket(file.string())) {

@@ -11,9 +11,6 @@ namespace terrace::bake {
 
 std::string HostName();
 
-// The name of this process's temporary file, which is renamed to `file`.
-std::string OwnPartial(const std::string& file);
-
 // kUnavailable: it is not known, because the folder or the bucket cannot be read now.
 Result<bool> Exists(const std::filesystem::path& file);
 // The whole file. kNotFound: there is none. kUnavailable: it cannot be read. kInvalidArgument: an object of more than
@@ -27,8 +24,8 @@ void Remove(const std::filesystem::path& file);
 
 // Creates a file together with its content, so that no process reads it empty. False: there is one already. An
 // object of a bucket is read again a second later: false, too, if another process has replaced it with other content.
-// Errors: the message says only why; of an object it names the object and the remedy too. A folder then has no such
-// file.
+// Errors: the message says only why; of an object it names the object and the remedy too. After an error a folder has
+// no such file.
 Result<bool> CreateFile(const std::string& file, const std::string& content);
 
 }  // namespace terrace::bake

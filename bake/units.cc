@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "archive/manifest.h"
 #include "archive/unit_name.h"
 #include "engine/geo/tile_cover.h"
 #include "proto/documents/subtree.h"

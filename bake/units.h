@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "archive/unit_name.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::bake {

@@ -22,11 +22,11 @@ namespace {
 using Bound = std::size_t (*)(libdeflate_compressor*, std::size_t);
 using Compress = std::size_t (*)(libdeflate_compressor*, const void*, std::size_t, void*, std::size_t);
 
-std::string CompressWith(Bound bound, Compress compress, std::string_view bytes, int level) {
+std::string CompressWith(Bound bound, Compress compress, std::string_view bytes) {
   struct Free {
     void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
   };
-  const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(level));
+  const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(kGzipLevel));
   if (compressor == nullptr) throw std::bad_alloc();  // the level is valid: only memory can be short
   std::string out(bound(compressor.get(), bytes.size()), '\0');
   const std::size_t size = compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size());
@@ -47,11 +47,10 @@ bool InPieces(std::string_view bytes, const std::stop_token& stop, const auto& t
   return true;
 }
 
-std::string GzipByZlib(std::string_view bytes, int level, const std::stop_token& stop) {
-  constexpr int kGzipHeader = 16, kMemory = 8, kMaxLevel = 9;
+std::string GzipByZlib(std::string_view bytes, const std::stop_token& stop) {
+  constexpr int kGzipHeader = 16, kMemory = 8;
   z_stream stream{};
-  if (::deflateInit2(&stream, std::min(level, kMaxLevel), Z_DEFLATED, kGzipHeader + MAX_WBITS, kMemory,
-                     Z_DEFAULT_STRATEGY) != Z_OK) {
+  if (::deflateInit2(&stream, kGzipLevel, Z_DEFLATED, kGzipHeader + MAX_WBITS, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) {
     throw std::bad_alloc();  // the level is valid: only memory can be short
   }
   const std::unique_ptr<z_stream, int (*)(z_stream*)> owner(&stream, ::deflateEnd);
@@ -72,10 +71,10 @@ std::string GzipByZlib(std::string_view bytes, int level, const std::stop_token&
 
 }  // namespace
 
-std::string Gzip(std::string_view bytes, int level, const std::stop_token& stop) {
+std::string Gzip(std::string_view bytes, const std::stop_token& stop) {
   if (stop.stop_requested()) return {};
-  if (bytes.size() > kCompressedAtOnce) return GzipByZlib(bytes, level, stop);
-  return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes, level);
+  if (bytes.size() > kCompressedAtOnce) return GzipByZlib(bytes, stop);
+  return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes);
 }
 
 std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes) {
@@ -99,12 +98,12 @@ std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes)
 }
 
 // The result is equal to that of BrotliEncoderCompress, because blocks do not depend on the division of the input.
-std::string Brotli(std::string_view bytes, int quality, const std::stop_token& stop) {
+std::string Brotli(std::string_view bytes, const std::stop_token& stop) {
   if (bytes.empty()) return "\x06";
   const std::unique_ptr<BrotliEncoderState, void (*)(BrotliEncoderState*)> encoder(
       BrotliEncoderCreateInstance(nullptr, nullptr, nullptr), BrotliEncoderDestroyInstance);
   if (encoder == nullptr) throw std::bad_alloc();
-  BrotliEncoderSetParameter(encoder.get(), BROTLI_PARAM_QUALITY, static_cast<std::uint32_t>(quality));
+  BrotliEncoderSetParameter(encoder.get(), BROTLI_PARAM_QUALITY, std::uint32_t{kBrotliQuality});
   BrotliEncoderSetParameter(encoder.get(), BROTLI_PARAM_SIZE_HINT,
                             static_cast<std::uint32_t>(std::min<std::size_t>(bytes.size(), 1 << 30)));
   std::string out(BrotliEncoderMaxCompressedSize(bytes.size()), '\0');
@@ -124,10 +123,10 @@ std::string Brotli(std::string_view bytes, int quality, const std::stop_token& s
   return out;
 }
 
-std::string Zstd(std::string_view bytes, int level, const std::stop_token& stop) {
+std::string Zstd(std::string_view bytes, const std::stop_token& stop) {
   const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
   if (context == nullptr) throw std::bad_alloc();
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kZstdLevel);
   ZSTD_CCtx_setPledgedSrcSize(context.get(), bytes.size());
   std::string out(ZSTD_compressBound(bytes.size()), '\0');
   ZSTD_outBuffer to{out.data(), out.size(), 0};
@@ -145,8 +144,8 @@ std::string Zstd(std::string_view bytes, int level, const std::stop_token& stop)
   return out;
 }
 
-std::string Zlib(std::string_view bytes, int level) {
-  return CompressWith(libdeflate_zlib_compress_bound, libdeflate_zlib_compress, bytes, level);
+std::string Zlib(std::string_view bytes) {
+  return CompressWith(libdeflate_zlib_compress_bound, libdeflate_zlib_compress, bytes);
 }
 
 std::optional<GzipMember> SplitGzip(std::string_view gzip) {

@@ -1,8 +1,8 @@
 // The addresses of a host, looked up within a deadline.
 //
-// The system's resolver has time-outs of its own, of half a minute and more. Therefore a separate thread calls it, and
-// the caller waits only until its deadline; only half of that time if an earlier look-up found addresses, which it gets
-// then.
+// The system's resolver has time-outs of its own, of half a minute and more. Therefore a separate thread calls it.
+// The caller waits until its deadline, or, if an earlier look-up found addresses, half of that time, and then gets
+// those.
 #pragma once
 
 #include <chrono>
@@ -29,8 +29,8 @@ class Resolver {
   // The resolver of the system, shared by the process with the addresses that it has found.
   static Resolver& OfSystem();
 
-  // Numbers are converted at once. If addresses were found before, waits for newer ones only half of the time until the
-  // deadline. At most one look-up of a host is under way. kUnavailable: the message says why.
+  // Numeric addresses are converted at once. At most one look-up of a host is under way. kUnavailable: the message says
+  // why.
   Result<std::vector<HostAddress>> Resolve(const std::string& host, std::uint16_t port,
                                            std::chrono::steady_clock::time_point deadline);
 

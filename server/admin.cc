@@ -6,18 +6,26 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <string_view>
 #include <utility>
 
+#include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
 #include "server/query/mesh_query.h"
 #include "server/telemetry/reply_record.h"
+#include "tiler/store/tile_selection.h"
 
 namespace terrace::server {
 namespace {
 
 constexpr std::string_view kPurgePath = "/admin/purge", kMetricsPath = "/metrics", kVersionPath = "/version";
+
+struct Purge {
+  std::string dataset, version;
+  tiler::TileSelection selection;
+};
 
 Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
   const std::size_t dash = text.find('-');
@@ -30,6 +38,35 @@ Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
   selection.min_level = static_cast<int>(*first);
   selection.max_level = static_cast<int>(*last);
   return {};
+}
+
+// `dataset=NAME`, and optionally `bbox=west,south,east,north` and `levels=8` or `levels=8-13`. kNotFound: `catalog` has
+// no such dataset. kInvalidArgument: the query is wrong. Messages are for the client.
+Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
+  constexpr std::array<const char*, 3> kNames = {"dataset", "bbox", "levels"};
+  std::array<std::optional<std::string>, kNames.size()> values;
+  const auto set = [&](std::size_t i, const std::string& value) -> Result<void> {
+    values[i] = value;
+    return {};
+  };
+  const Result<void> read = ReadParameters(query, kNames, set, {}, /*takes_version=*/false);
+  if (!read) return tl::unexpected(read.error());
+  const auto& [dataset, box, levels] = values;
+  if (!dataset) return MakeError(ErrorCode::kInvalidArgument, "dataset is missing: name the one to purge");
+  const Result<std::uint32_t> index = FindDataset(*dataset, catalog.datasets);
+  if (!index) return tl::unexpected(index.error());
+  const DatasetView& found = catalog.datasets[*index];
+  Purge purge{found.name, found.version(), {}};
+  purge.selection.generation = found.cache_generation;
+  if (box) {
+    const Result<dem::GeoBounds> bounds = ParseBox(*box);
+    if (!bounds) return tl::unexpected(bounds.error());
+    purge.selection.box = *bounds;
+  }
+  if (levels) {
+    if (const Result<void> set = SetLevels(purge.selection, *levels); !set) return tl::unexpected(set.error());
+  }
+  return purge;
 }
 
 struct Purged {
@@ -58,33 +95,6 @@ std::string PurgedJson(const Purge& purge, const Purged& purged) {
 }
 
 }  // namespace
-
-Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
-  constexpr std::array<const char*, 3> kNames = {"dataset", "bbox", "levels"};
-  std::array<std::optional<std::string>, kNames.size()> values;
-  const auto set = [&](std::size_t i, const std::string& value) -> Result<void> {
-    values[i] = value;
-    return {};
-  };
-  const Result<void> read = ReadParameters(query, kNames, set, {}, /*takes_version=*/false);
-  if (!read) return tl::unexpected(read.error());
-  const auto& [dataset, box, levels] = values;
-  if (!dataset) return MakeError(ErrorCode::kInvalidArgument, "dataset is missing: name the one to purge");
-  const Result<std::uint32_t> index = FindDataset(*dataset, catalog.datasets);
-  if (!index) return tl::unexpected(index.error());
-  const DatasetView& found = catalog.datasets[*index];
-  Purge purge{found.name, found.version(), {}};
-  purge.selection.generation = found.cache_generation;
-  if (box) {
-    const Result<dem::GeoBounds> bounds = ParseBox(*box);
-    if (!bounds) return tl::unexpected(bounds.error());
-    purge.selection.box = *bounds;
-  }
-  if (levels) {
-    if (const Result<void> set = SetLevels(purge.selection, *levels); !set) return tl::unexpected(set.error());
-  }
-  return purge;
-}
 
 // Serves one connection.
 class AdminApplication::Handler final : public ConnectionHandler {

@@ -5,9 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 
-#include "engine/core/result.h"
 #include "server/http/application.h"
 #include "server/jobs/worker_pool.h"
 #include "server/telemetry/access_log.h"
@@ -16,17 +14,8 @@
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
 #include "tiler/store/refinement_cache.h"
-#include "tiler/store/tile_selection.h"
 
 namespace terrace::server {
-
-// `dataset=NAME`, and optionally `bbox=west,south,east,north` and `levels=8` or `levels=8-13`. kNotFound: `catalog` has
-// no such dataset. kInvalidArgument: the query is wrong. Messages are for the client.
-struct Purge {
-  std::string dataset, version;
-  tiler::TileSelection selection;
-};
-Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog);
 
 // What the application uses; outlives it.
 struct AdminParts {

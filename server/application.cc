@@ -6,6 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
+#include "server/api/tile_formats.h"
 #include "server/http/http_error.h"
 #include "server/routes.h"
 #include "server/telemetry/reply_record.h"

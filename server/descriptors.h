@@ -7,7 +7,6 @@
 #include <cstddef>
 
 #include "engine/core/result.h"
-#include "engine/gdal/gdal_runtime.h"
 
 namespace terrace::server {
 

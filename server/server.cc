@@ -24,7 +24,6 @@
 #include "server/http/listener.h"
 #include "server/http/session.h"
 #include "server/net/io_threads.h"
-#include "server/routes.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_page.h"
 

@@ -9,7 +9,6 @@
 #include "engine/common/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
-#include "proto/height_span.h"
 
 namespace terrace::tiler {
 

@@ -28,7 +28,7 @@ Result<void> PutText(std::string_view text, const std::string& object);
 // the two apart.
 Result<std::vector<std::string>> NamesInBucket(const std::string& folder);
 
-// An object that is not there is no error; others are ignored as well.
+// Removes an object if it is there; all errors are ignored.
 void RemoveObject(const std::string& object);
 
 }  // namespace terrace::archive

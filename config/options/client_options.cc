@@ -6,6 +6,7 @@
 
 #include "config/common/token_hash.h"
 #include "config/options/option_table.h"
+#include "engine/core/ascii.h"
 #include "engine/core/parse_number.h"
 
 namespace terrace::config {
@@ -15,8 +16,6 @@ constexpr std::size_t kMaxTokenBytes = 256, kHashDigits = 64;
 constexpr double kMaxRequests = 1e6;
 
 bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
-
-char ToLower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 bool ConsistsOf(std::string_view text, std::string_view others) {
   return std::all_of(text.begin(), text.end(),

@@ -44,7 +44,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
   return table;
 }
 
-Codec<Config> DiskCacheOption() {
+Codec<Config> DiskCacheCodec() {
   return ObjectOf(&Config::disk_cache, &DiskCacheConfig::directory, DiskCacheOptionTable(),
                   R"({"directory": "/var/cache/terrace/tiles"})");
 }

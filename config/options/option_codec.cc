@@ -48,11 +48,6 @@ Json TextsToJson(const std::string& text) {
   return list;
 }
 
-bool HasControlCharacter(const std::string& text) {
-  return std::any_of(text.begin(), text.end(),
-                     [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-}
-
 std::string CheckOneLine(const std::string& text) {
   return HasControlCharacter(text) ? "must be text on one line" : "";
 }

@@ -16,6 +16,7 @@
 
 #include "config/input/config_location.h"
 #include "config/input/json_text.h"
+#include "engine/core/ascii.h"
 #include "engine/core/names.h"
 
 namespace terrace::config {
@@ -51,7 +52,6 @@ inline Json InRange(const char* type, Json min, Json max) {
 
 inline constexpr double kMaxHeight = 20'000;  // metres, up and down
 
-bool HasControlCharacter(const std::string& text);
 // A check for Text: returns "must be text on one line", or an empty string.
 std::string CheckOneLine(const std::string& text);
 

@@ -171,13 +171,13 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable();
 
 // disk_cache_option.cc
 // {"directory": "/var/cache/terrace/tiles", "tile_bytes": ..., ...}. As a flag: only the directory.
-Codec<Config> DiskCacheOption();
+Codec<Config> DiskCacheCodec();
 
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();
 
 // shared_cache_option.cc
 // {"url": "redis://cache:6379/0", "timeout_ms": 25, ...}. As a flag: only the URL.
-Codec<Config> SharedCacheOption();
+Codec<Config> SharedCacheCodec();
 
 const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable();
 

@@ -221,7 +221,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .help = "Folder that keeps finished tiles and refinements across restarts",
        .details = "In the file an object, `{\"directory\": \"/var/cache/terrace/tiles\"}`; as a flag the folder alone. "
                   "Relative to the folder of the file. [More](#disk-cache)",
-       .codec = DiskCacheOption(),
+       .codec = DiskCacheCodec(),
        .other_words = "cache"},
       {.key = "shared_cache",
        .value = "URL",
@@ -229,7 +229,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .help = "Redis in which servers of a fleet share tiles that take long to build",
        .details = "In the file an object, `{\"url\": \"redis://HOST:6379/0\"}`; as a flag the URL alone. "
                   "[More](#shared-cache)",
-       .codec = SharedCacheOption(),
+       .codec = SharedCacheCodec(),
        .other_words = "redis memcached"},
       {.key = "gdal_cache_bytes",
        .value = "BYTES",

@@ -72,7 +72,7 @@ const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable() {
   return table;
 }
 
-Codec<Config> SharedCacheOption() {
+Codec<Config> SharedCacheCodec() {
   return ObjectOf(&Config::shared_cache, &SharedCacheConfig::url, SharedCacheOptionTable(),
                   R"({"url": "redis://HOST:6379/0"})");
 }

@@ -2,7 +2,6 @@
 // between served heights and the raster grid's samples.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>

@@ -27,7 +27,7 @@ GridStatistics::GridStatistics(const RasterGrid& grid, const GridReading& readin
 }
 
 // Columns of grids around the Earth jump by one turn somewhere. They are followed from node to node, which are less
-// than half a turn apart. Nodes without a position are far from the raster grid and need no table.
+// than half a turn apart. Nodes without a position are far from the raster grid and need no ranges.
 Box GridStatistics::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   if (grid_.members().size() == 1) return hull;  // near members are not needed
@@ -90,7 +90,7 @@ BlockRange GridStatistics::Ranges(double west, double north, double east, double
   BlockRange range;
   ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
-    range.Add(statistics != nullptr ? statistics->table.Query(west - x, north - y, east - x, south - y)
+    range.Add(statistics != nullptr ? statistics->ranges.Query(west - x, north - y, east - x, south - y)
                                     : member.raster->RangeIn(west - x, north - y, east - x, south - y));
   });
   return range;

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "engine/bound/column_differences.h"
 #include "engine/bound/geoid_error_bound.h"

@@ -131,7 +131,7 @@ constexpr std::int64_t FloorMod(std::int64_t value, std::int64_t modulus) {
   return (value % modulus + modulus) % modulus;
 }
 
-// One raster, as `terrace info` prints it.
+// What is known of one raster, for `terrace info` and the log.
 struct RasterInfo {
   std::string path;
   std::string driver;  // GDAL's short name: "GTiff"
@@ -165,7 +165,6 @@ struct RasterInfo {
   // Each of the finest stored averages covers N x N samples; this is N. 0: none are stored.
   int min_kept_factor = 0;
   bool has_averages_in_cache_folder = false;  // false: in memory
-  double seconds_to_open = 0;
 };
 
 // A dataset, as `terrace info` prints it; `/datasets` returns a part of it.

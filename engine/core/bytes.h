@@ -2,9 +2,7 @@
 #pragma once
 
 #include <bit>
-#include <cstdint>
 #include <cstring>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>

@@ -22,8 +22,8 @@ enum class ErrorCode {
   kUnavailable,      // a source or a resource does not respond now; a retry may succeed
   kChanged,          // a source file has changed since it was opened; reopening it may succeed
   kOverloaded,  // refused for now: a queue or store is full, memory is short, another process writes to the same folder
-  kCancelled,   // nobody waits for the result any more; the deadline has passed; or ElevationModel::OpenFromCache lacks
-                // statistics, which only Open computes
+  kCancelled,   // stopped: nobody waits for the result, the deadline has passed, or the process ends; or
+                // ElevationModel::OpenFromCache lacks statistics, which only Open computes
   kInternal,    // a library failed unexpectedly
 };
 

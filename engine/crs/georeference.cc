@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "engine/core/plain_number.h"
-#include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/sample_rules.h"
 
 namespace terrace::dem {

@@ -6,6 +6,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/mercator_grid.h"
 #include "engine/geo/octave.h"
 
 namespace terrace::dem {

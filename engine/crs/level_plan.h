@@ -8,7 +8,6 @@
 #include "engine/core/result.h"
 #include "engine/crs/georeference.h"
 #include "engine/geo/lattice.h"
-#include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
 

@@ -20,9 +20,9 @@ namespace terrace::dem {
 // The position of nodes that a raster's CRS cannot represent: NaN.
 inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
-// The largest error of a node's position. Unit: the spacing of the averages in use, `factor` pixels. Affine positions
-// are exact but for rounding. Others are interpolated with a tolerance of 1e-5 of this spacing, which is checked at a
-// few nodes of each cell. The largest measured error is 5e-5, of datums with grids of shifts.
+// The largest error of a node's position, in spacings of the averages in use: times their factor, in pixels. Affine
+// positions are exact but for rounding. Others are interpolated with a tolerance of 1e-5 of this spacing, which is
+// checked at a few nodes of each cell. The largest measured error is 5e-5, of datums with grids of shifts.
 inline double MaxPositionError(const Georeference& georeference) { return georeference.is_affine() ? 1e-9 : 1e-4; }
 
 // The window of a tile's samples with a halo of one.

@@ -57,7 +57,7 @@ ContentHash ContentBelow(const ElevationModel& model, const geo::TileKey& top, i
   hasher.Add(impl.floor);
   hasher.Add(model.max_source_level());
   for (int level = top.level; level <= deepest; ++level) hasher.Add(impl.LatticeOf(level).cells);
-  for (const std::size_t i : impl.GridsNear(top)) {
+  for (const std::size_t i : impl.GridsAt(top)) {
     const RasterGrid& grid = impl.grids[i];
     hasher.Add(impl.contents[i].grid);
     const std::vector<std::size_t> members = grid.MembersBelow(top, impl.lattices, deepest);

@@ -55,8 +55,8 @@ Result<std::string> ElevationModel::Impl::AddUndulations(Edit& edit) const {
     }
   }
   edit.undulations = std::move(patch);
-  edit.is_in_source_datum = CountsFrom((*geoid)->pipeline(), HeightDatum::kSource, edit.reach);
-  edit.is_in_orthometric = CountsFrom((*geoid)->pipeline(), HeightDatum::kOrthometric, edit.reach);
+  edit.is_in_source_datum = AreHeightsAbove((*geoid)->pipeline(), HeightDatum::kSource, edit.reach);
+  edit.is_in_orthometric = AreHeightsAbove((*geoid)->pipeline(), HeightDatum::kOrthometric, edit.reach);
   Complete(edit);
   return std::string();
 }
@@ -71,7 +71,7 @@ std::string GeoidIn(HeightDatum datum, const VerticalDatum& source) {
   return egm96;
 }
 
-bool ElevationModel::Impl::CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const {
+bool ElevationModel::Impl::AreHeightsAbove(const std::string& geoid, HeightDatum datum, const Box& reach) const {
   // The floor shows where no source has a height.
   if (datum == HeightDatum::kSource && floor_undulations != nullptr && floor_undulations->geoid().pipeline() != geoid) {
     return false;

@@ -165,7 +165,7 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
   edit.high_m = model.info().heights.max;
   const auto is_in = [&](HeightDatum datum) {
     const std::string geoid = GeoidIn(datum, model.impl_->grids.front().vertical());
-    return model.impl_->CountsFrom(geoid, datum, edit.reach) && CountsFrom(geoid, datum, edit.reach);
+    return model.impl_->AreHeightsAbove(geoid, datum, edit.reach) && AreHeightsAbove(geoid, datum, edit.reach);
   };
   edit.is_in_source_datum = is_in(HeightDatum::kSource);
   edit.is_in_orthometric = is_in(HeightDatum::kOrthometric);

@@ -57,7 +57,7 @@ class ElevationModel::Impl {
                             const std::stop_token& stop, bool counts_between = false) const;
   // The raster grids that may have heights in the box, in order of precedence.
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
-  std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
+  std::vector<std::size_t> GridsAt(const geo::TileKey& tile) const;
 
   // Edits. Defined in dem_edits.cc, if no other file is named.
   Result<void> OpenEdits(const DemOptions& options);
@@ -69,7 +69,7 @@ class ElevationModel::Impl {
   Result<std::string> AddUndulations(Edit& edit) const;
   // Whether reads in `datum` return all heights that an edit with this reach may touch above `geoid` (GeoidIn).
   // dem_edit_datum.cc.
-  bool CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const;
+  bool AreHeightsAbove(const std::string& geoid, HeightDatum datum, const Box& reach) const;
   // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.
   Result<std::vector<double>> DatumUndulations(const geo::NodeGrid& node_grid, const NodeWindow& window,

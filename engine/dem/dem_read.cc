@@ -231,7 +231,7 @@ std::vector<std::size_t> ElevationModel::Impl::GridsAt(const Box& box) const {
   return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 
-std::vector<std::size_t> ElevationModel::Impl::GridsNear(const geo::TileKey& tile) const {
+std::vector<std::size_t> ElevationModel::Impl::GridsAt(const geo::TileKey& tile) const {
   const geo::Lattice& lattice = LatticeOf(tile.level);
   return GridsAt(BoxOf(lattice, WindowOfTile(lattice, tile)));
 }

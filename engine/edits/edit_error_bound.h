@@ -25,7 +25,9 @@ namespace terrace::dem {
 // Another source's heights at the nodes of a window; NaN where it has none.
 struct ReplacementHeights {
   std::vector<float> heights;
-  double error_m = 0;  // of the surface between them, and the heights before all edits instead of NaN, to its samples
+  // A bound of the distance between the source's samples and the surface through these heights. At nodes with NaN the
+  // surface has the height before all edits.
+  double error_m = 0;
   // By cell of the window, row by row from the south: 1 where samples of the source may be voids. Empty: nowhere.
   std::vector<std::uint8_t> void_cells = {};
 };
@@ -35,8 +37,7 @@ struct EditedNode {
   EditPlace place;
   double height = 0;  // before the edit
   double target = 0;  // NaN: unknown, the weight is 0
-  // Of a replacement with an unknown target: what stands for it in ReplacementHeights::error_m, the height before all
-  // edits.
+  // If the target of a replacement is unknown: the height before all edits, which ReplacementHeights::error_m assumes.
   double assumed_target = 0;
 };
 

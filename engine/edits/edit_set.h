@@ -8,7 +8,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <span>
 #include <stop_token>
 #include <unordered_map>
@@ -72,8 +71,7 @@ class EditSet {
   HeightRange Extended(HeightRange range, std::span<const std::size_t> which,
                        const std::function<HeightRange(const Edit&)>& replacement) const;
 
-  // What the edits ask of the mesh of a window of nodes without a halo (engine/edits/edit_effects.h). Empty members if
-  // they ask nothing.
+  // What the edits ask of the mesh of a window of nodes without a halo; empty members: nothing.
   MeshDemands DemandsOf(const geo::Lattice& lattice, const NodeWindow& window,
                         std::span<const std::size_t> which) const;
 

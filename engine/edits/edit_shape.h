@@ -28,7 +28,7 @@ class EditRow {
   // The height that the edit aims at, at a point of the row and its At: as stated if the edit is stated in `datum`,
   // else above the ellipsoid. Precondition: flatten, slope, carve or raise.
   double TargetAt(double x, const EditPlace& place, HeightDatum datum = HeightDatum::kEllipsoid) const;
-  // Where the row enters and leaves polygons, in turns, ascending.
+  // The x where the row enters and leaves polygons, alternately; ascending.
   const std::vector<double>& crossings() const { return crossings_; }
 
  private:

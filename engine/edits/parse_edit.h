@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/core/result.h"
 #include "engine/edits/edit.h"
 #include "engine/edits/read_edits.h"
 

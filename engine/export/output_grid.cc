@@ -9,7 +9,6 @@
 #include <numbers>
 #include <utility>
 
-#include "engine/core/plain_number.h"
 #include "engine/crs/projector.h"
 #include "engine/gdal/gdal_runtime.h"
 

@@ -1,7 +1,6 @@
 // Grids of heights for other programs: their positions, and files of them.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>

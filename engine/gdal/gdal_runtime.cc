@@ -20,7 +20,6 @@
 #include <string_view>
 #include <utility>
 
-#include "engine/common/dem_types.h"
 #include "engine/common/idle_pool.h"
 #include "engine/core/check.h"
 #include "engine/gdal/driver_list.h"

@@ -18,7 +18,7 @@ namespace terrace::dem {
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
 // Reads a rectangle of a band as `type`, row by row from the north, without rescaling. False: it cannot be read;
-// TakeGdalError says why. So are blocks of GeoPackages and MBTiles for which GDAL fills in zeros and returns success.
+// TakeGdalError says why. Also false for blocks of GeoPackages and MBTiles that GDAL silently fills with zeros.
 bool ReadRaw(GDALRasterBand& band, int col, int row, int cols, int rows, GDALDataType type, void* out);
 
 // Clears what GDAL has cached of remote files: of the raster, or of the parts of a VRT. Call before a dataset is

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/common/dem_types.h"
+#include "engine/core/ascii.h"
 #include "engine/gdal/convert_samples.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
@@ -118,8 +119,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
   std::string name;
   for (const char c : unit) {
     if (std::isdigit(static_cast<unsigned char>(c))) return std::nullopt;  // "0.1 m"
-    if (std::isalpha(static_cast<unsigned char>(c)))
-      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (std::isalpha(static_cast<unsigned char>(c))) name += ToLower(c);
   }
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
   struct Unit {

@@ -16,6 +16,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "engine/core/ascii.h"
 #include "engine/core/errno_text.h"
 #include "engine/gdal/driver_list.h"
 #include "engine/gdal/gdal_runtime.h"
@@ -48,10 +49,6 @@ const std::vector<std::string>& DriversOf(const SourcePolicy& policy) {
 bool IsBelow(const fs::path& path, const fs::path& root) {
   const auto [rest, ignored] = std::mismatch(root.begin(), root.end(), path.begin(), path.end());
   return rest == root.end();
-}
-
-bool HasControlCharacter(const std::string& text) {
-  return std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
 }
 
 // Accepts names that stay below an allowed prefix: no "..", options ("?") or nested names.
@@ -207,7 +204,7 @@ bool IsOneLine(const std::string& path) { return !HasControlCharacter(path); }
 std::string EscapeControls(const std::string& path) {
   std::string escaped;
   for (const char c : path) {
-    if (HasControlCharacter(std::string(1, c))) {
+    if (HasControlCharacter({&c, 1})) {
       escaped += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
     } else {
       escaped += c;

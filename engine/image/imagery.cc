@@ -12,7 +12,6 @@
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
 #include "engine/crs/node_positions.h"
-#include "engine/gdal/file_content.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/geo/mercator_grid.h"
 #include "engine/image/image_bins.h"

@@ -5,12 +5,10 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "engine/common/dem_types.h"
 #include "engine/core/color.h"
 #include "engine/core/result.h"
 #include "engine/sources/read_raster.h"

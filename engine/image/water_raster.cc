@@ -10,7 +10,6 @@
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
 #include "engine/crs/node_positions.h"
-#include "engine/gdal/file_content.h"
 #include "engine/gdal/handle_pool.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/sample_rules.h"

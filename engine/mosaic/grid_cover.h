@@ -7,7 +7,6 @@
 
 #include "engine/common/box_index.h"
 #include "engine/crs/node_positions.h"
-#include "engine/geo/tile_key.h"
 #include "engine/mosaic/grid_members.h"
 #include "engine/raster/raster_layout.h"
 

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <span>
 #include <stop_token>
 #include <vector>

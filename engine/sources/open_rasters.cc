@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -15,6 +14,7 @@
 
 #include "engine/common/parallel_for.h"
 #include "engine/common/source_log.h"
+#include "engine/core/ascii.h"
 #include "engine/gdal/driver_list.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/source_policy.h"
@@ -27,7 +27,7 @@ bool LooksLikeRaster(const std::string& path) {
   constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
                                            ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};
   std::string name = path;
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(name, name.begin(), ToLower);
   return std::ranges::any_of(kEndings, [&](std::string_view ending) { return name.ends_with(ending); });
 }
 

@@ -9,9 +9,6 @@
 #include <utility>
 
 #include "engine/common/source_log.h"
-#include "engine/core/elapsed_time.h"
-#include "engine/core/plain_number.h"
-#include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/sample_messages.h"
 #include "engine/sources/located_raster.h"
@@ -160,7 +157,6 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          const std::stop_token& stop,
                                                          std::shared_ptr<StatisticsPages> pages, unsigned threads,
                                                          bool only_cached) {
-  const auto start = std::chrono::steady_clock::now();
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
   auto located = OpenLocatedRaster(path);
   if (!located) return tl::unexpected(located.error());
@@ -181,7 +177,6 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->footprint_ = Footprint::Of(source->georeference_);
   source->FillInfo(dataset, path, *prepared);
   source->info_.overviews_unused = std::move(overviews_unused);
-  source->info_.seconds_to_open = SecondsSince(start);
   source->info_.warnings = std::move(located->warnings);
   std::ranges::move(WarningsOf(dataset, source->georeference_, source->spacing_.finer, source->vertical_,
                                options.vertical, source->layout_),
@@ -281,7 +276,7 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
     return;
   }
   paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
-                                                  statistics.table.Coarse(kMaxCoarse),
+                                                  statistics.ranges.Coarse(kMaxCoarse),
                                                   !statistics.coarse.grids.empty(),
                                                   std::move(prepared.cache_file),
                                                   std::move(prepared.key),
@@ -319,9 +314,9 @@ Result<RasterStatistics> RasterSource::ReadStatistics() const {
 }
 
 BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
-  if (kept_) return kept_->table.Query(west, north, east, south);
+  if (kept_) return kept_->ranges.Query(west, north, east, south);
   if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
-  return statistics()->table.Query(west, north, east, south);
+  return statistics()->ranges.Query(west, north, east, south);
 }
 
 // Until the raster is reopened, it is read at full resolution.

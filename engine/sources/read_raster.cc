@@ -12,7 +12,6 @@
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/sample_messages.h"
 #include "engine/gdal/sample_rules.h"
-#include "engine/statistics/raster_chunk.h"
 #include "engine/statistics/sample_rows.h"
 #include "engine/statistics/undeclared_nodata.h"
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "engine/common/dem_types.h"
-#include "engine/raster/grid_cells.h"
 #include "engine/statistics/averaging_errors.h"
 #include "engine/statistics/kept_factors.h"
 #include "engine/statistics/sample_rows.h"
@@ -397,14 +396,14 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
 bool CanShareDataset(const RasterLayout& layout) { return layout.overview_factors.empty() && !layout.wraps; }
 
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                            std::int64_t& read, const std::stop_token& stop,
+                                            std::int64_t& chunks_read, const std::stop_token& stop,
                                             std::mutex* dataset_mutex) {
   std::unique_lock<std::mutex> lock;
   if (dataset_mutex != nullptr) lock = std::unique_lock(*dataset_mutex);
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   ChunkStatistics statistics = VoidStatistics(chunk, layout);
   if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);
-  ++read;
+  ++chunks_read;
   const Chunk box = WithHalo(chunk, layout);
   const Samples samples{box, std::make_unique_for_overwrite<float[]>(Area(box.cols, box.rows))};
   if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.get(), stop);

@@ -82,11 +82,11 @@ ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 // Number of averages of a factor in a chunk that is not void; 0 if an overview has them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
-// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading.
-// `dataset_mutex`: locked while the samples are read, so that several threads may share the dataset and `read`; null:
-// one thread uses them. kUnavailable: the raster cannot be read. kCancelled: stopped.
+// Increments `chunks_read` if samples were read; chunks that a sparse file does not store are void without reading.
+// `dataset_mutex`: locked while the samples are read, so that several threads may share the dataset and `chunks_read`;
+// null: one thread uses them. kUnavailable: the raster cannot be read. kCancelled: stopped.
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                            std::int64_t& read, const std::stop_token& stop = {},
+                                            std::int64_t& chunks_read, const std::stop_token& stop = {},
                                             std::mutex* dataset_mutex = nullptr);
 
 // Whether statistics need the dataset only for their samples. Otherwise threads must not share it: overviews, and the

@@ -211,7 +211,7 @@ std::vector<float> AveragesGrid::Read(const GridWindow& window) const {
 }
 
 std::size_t RasterStatistics::bytes() const {
-  std::size_t bytes = sizeof(RasterStatistics) + table.bytes();
+  std::size_t bytes = sizeof(RasterStatistics) + ranges.bytes();
   for (const AveragingErrors::Level& level : errors.levels()) bytes += level.errors.size() * sizeof(float);
   for (const CoarseAverages::Grid& grid : coarse.grids) bytes += grid.heights.size() * sizeof(float);
   return bytes;
@@ -222,12 +222,12 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
       voids_(layout.columns, layout.height, [this](int row, int first, int last, std::int64_t samples) {
         // A hole of one sample is filled from its neighbours, whose heights are in the ranges of every box with this
         // sample.
-        if (samples > 1) statistics_.table.MarkHole(row, first, last);
+        if (samples > 1) statistics_.ranges.MarkHole(row, first, last);
         statistics_.enclosed_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
   content_.Add(layout.width);
   content_.Add(layout.height);
-  statistics_.table = RangeTable(layout.width, layout.height);
+  statistics_.ranges = RangeTable(layout.width, layout.height);
   statistics_.errors = AveragingErrors(layout.width, layout.height);
   if (!layout.overview_factors.empty()) return;
   statistics_.coarse = CoarseAverages::ShapedFor(layout);
@@ -236,8 +236,8 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
 
 void StatisticsAssembler::Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics) {
   content_.Add(chunk_statistics.content);
-  statistics_.table.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
-                              DivideUp(chunk.cols, RangeTable::kBlock), chunk_statistics.ranges);
+  statistics_.ranges.AddBlocks(chunk.col / RangeTable::kBlock, chunk.row / RangeTable::kBlock,
+                               DivideUp(chunk.cols, RangeTable::kBlock), chunk_statistics.ranges);
   statistics_.valid += static_cast<std::uint64_t>(chunk_statistics.valid);
   statistics_.zeros.Add(chunk_statistics.zeros);
   voids_.Add(chunk, chunk_statistics);
@@ -317,7 +317,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
 
 Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
   if (layout_.overview_factors.empty()) return {};
-  RangeTable samples = statistics_.table;
+  RangeTable samples = statistics_.ranges;
   samples.Finish();
   for (const int factor : layout_.overview_factors) {
     RangeTable overview(layout_.width, layout_.height);
@@ -329,7 +329,7 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
         const auto heights = ReadAverages(dataset, layout_, factor, {box.col, box.row, box.cols, box.rows}, stop);
         if (!heights) return tl::unexpected(heights.error());
         content_.AddBytes(heights->data(), heights->size() * sizeof(float));
-        statistics_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
+        statistics_.ranges.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
         overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
       }
     }
@@ -343,7 +343,7 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
       static_cast<std::uint64_t>(layout_.width) * static_cast<std::uint64_t>(layout_.height) - statistics_.valid;
   statistics_.rim_voids = voids_.Finish();
   if (statistics_.rim_voids.is_everything()) statistics_.enclosed_samples = 0;
-  const BlockRange samples = statistics_.table.OfFinest();
+  const BlockRange samples = statistics_.ranges.OfFinest();
   if (statistics_.valid > 0) {
     statistics_.lowest = samples.min;
     statistics_.highest = samples.max;
@@ -351,7 +351,7 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
   statistics_.edge_row_means = {MeanOf(first_row_), MeanOf(last_row_)};
   if (auto coarse = FinishCoarse(dataset, stop); !coarse) return tl::unexpected(coarse.error());
   if (auto overviews = AddOverviews(dataset, stop); !overviews) return tl::unexpected(overviews.error());
-  statistics_.table.Finish();
+  statistics_.ranges.Finish();
   statistics_.content = content_.Hash();
   return std::move(statistics_);
 }

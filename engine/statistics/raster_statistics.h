@@ -30,8 +30,8 @@ struct AveragesGrid {
   std::vector<float> Read(const GridWindow& window) const;
 };
 
-// All averages of factors kLargestMeasuredFactor and above: at most a 4096th of the raster's samples. Empty for a
-// raster whose overviews have them (KeepsCoarse).
+// All averages of factors kLargestMeasuredFactor and above: about a 3000th of the raster's samples. Empty for a raster
+// whose overviews have them (KeepsCoarse).
 class CoarseAverages {
  public:
   using Grid = AveragesGrid;
@@ -48,7 +48,7 @@ class CoarseAverages {
 
 struct RasterStatistics {
   ContentHash content;            // of all heights, including those of overviews that are read
-  RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
+  RangeTable ranges;              // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples; 0 if all are voids
   // An overview that is read has a height far outside the range of the raster's samples around it: it was made of
   // nodata values, or of other samples.

@@ -76,7 +76,7 @@ void RangeFields(Archive& archive, Ranges& ranges) {
 
 template <typename Archive, typename Zeros>
 void ZeroFields(Archive& archive, Zeros& zeros) {
-  archive(zeros.high, zeros.low, zeros.zeros, zeros.at_border, zeros.west, zeros.east, zeros.north, zeros.south);
+  archive(zeros.steep, zeros.gentle, zeros.zeros, zeros.at_border, zeros.west, zeros.east, zeros.north, zeros.south);
   archive(zeros.lowest, zeros.highest);
 }
 
@@ -161,7 +161,7 @@ std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& 
 
 std::string EncodeStatistics(const RasterStatistics& statistics) {
   const RimVoids& voids = statistics.rim_voids;
-  TableParts parts{voids.is_everything(), voids.regions(), voids.Runs(), statistics.table.finest()};
+  TableParts parts{voids.is_everything(), voids.regions(), voids.Runs(), statistics.ranges.finest()};
   Writer writer;
   StatisticsFields(writer, statistics, parts, {});
   return writer.Take();
@@ -169,9 +169,9 @@ std::string EncodeStatistics(const RasterStatistics& statistics) {
 
 std::optional<RasterStatistics> DecodeStatistics(std::string_view bytes, const RasterLayout& layout) {
   RasterStatistics statistics;
-  statistics.table = RangeTable(layout.width, layout.height);
+  statistics.ranges = RangeTable(layout.width, layout.height);
   statistics.errors = AveragingErrors(layout.width, layout.height);
-  TableParts parts{0, 0, {}, statistics.table.finest()};
+  TableParts parts{0, 0, {}, statistics.ranges.finest()};
   Reader reader(bytes);
   StatisticsFields(reader, statistics, parts, layout);
   if (!reader.ok()) return std::nullopt;
@@ -181,8 +181,8 @@ std::optional<RasterStatistics> DecodeStatistics(std::string_view bytes, const R
     row = run.row;
   }
   statistics.rim_voids = parts.is_everything != 0 ? RimVoids::Everything() : RimVoids(parts.runs, parts.regions);
-  statistics.table.AddBlocks(0, 0, DivideUp(layout.width, RangeTable::kBlock), parts.ranges);
-  statistics.table.Finish();
+  statistics.ranges.AddBlocks(0, 0, DivideUp(layout.width, RangeTable::kBlock), parts.ranges);
+  statistics.ranges.Finish();
   return statistics;
 }
 

@@ -162,8 +162,8 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& ch
       above += static_cast<int>(is_pair & (other > step));
       others += static_cast<int>(is_pair & (other <= step));  // not of NaN
     }
-    high += above;
-    low += others;
+    steep += above;
+    gentle += others;
   };
   const auto zeros_in = [&](int row) {
     int count = 0;
@@ -205,8 +205,8 @@ void ZeroEdges::AddGround(const float* heights, int cols, int raster_col, int ra
 }
 
 void ZeroEdges::Add(const ZeroEdges& other) {
-  high += other.high;
-  low += other.low;
+  steep += other.steep;
+  gentle += other.gentle;
   zeros += other.zeros;
   at_border += other.at_border;
   west = std::min(west, other.west);
@@ -224,8 +224,8 @@ bool ZeroEdges::IsCollar(int raster_width, int raster_height) const {
   const bool reaches_all_sides = west <= margin_x && east >= raster_width - 1 - margin_x && north <= margin_y &&
                                  south >= raster_height - 1 - margin_y;
   if (!reaches_all_sides || !(lowest < highest)) return false;
-  const bool is_strewn = high * 4 > zeros && at_border * 4 < zeros;
-  return at_border >= kFewest && high >= kFewest && low * kExceptions <= high && !is_strewn;
+  const bool is_strewn = steep * 4 > zeros && at_border * 4 < zeros;
+  return at_border >= kFewest && steep >= kFewest && gentle * kExceptions <= steep && !is_strewn;
 }
 
 void DetectedNodata::AddTo(SampleRules& rules) const {

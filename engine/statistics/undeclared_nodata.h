@@ -19,7 +19,8 @@ struct Chunk;  // raster_chunk.h
 
 // Counts of the zeros of a raster and of their neighbours.
 struct ZeroEdges {
-  std::int64_t high = 0, low = 0;  // pairs of a zero and a nonzero neighbour that differ by more than the step; by less
+  // Pairs of a zero and a nonzero neighbour that differ by more than the step, and by less.
+  std::int64_t steep = 0, gentle = 0;
   std::int64_t zeros = 0, at_border = 0;  // all zeros; zeros in the outermost rows and columns
   // The ground, which is all nonzero samples: its first and last columns and rows, and two different heights of it if
   // there are any.

@@ -4,8 +4,6 @@
 // so that two fields that share a border choose the same vertices on it. Safe to call from many threads at once.
 #pragma once
 
-#include <cstdint>
-
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/candidate.h"
 #include "engine/tin/mesh/height_field.h"

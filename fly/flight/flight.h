@@ -3,10 +3,7 @@
 
 #include <atomic>
 #include <functional>
-#include <string>
-#include <vector>
 
-#include "engine/core/result.h"
 #include "fly/flight/statistics.h"
 #include "fly/http/http_client.h"
 #include "fly/scene/flight_path.h"

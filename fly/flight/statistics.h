@@ -54,7 +54,7 @@ struct RequestRecord {
   CacheTier tier = CacheTier::kUnknown;
   bool is_tile = true;  // not a document or subtree
   bool opened_connection = false;
-  double seconds = 0;  // from the first request of a tile, while the client asked for it and paused
+  double seconds = 0;  // of a tile: of all its requests so far and the pauses between them
   std::uint64_t bytes = 0;
   std::uint32_t triangles = 0;
   bool is_incomplete = false;  // the triangles do not cover the tile's rectangle

@@ -16,7 +16,7 @@ namespace terrace::fly {
 struct HttpOptions {
   int threads = 1;
   int clients = 1;  // each has connections of its own
-  // Of connecting to a resolved host, its addresses share it, and of a request with its reply.
+  // Limit of connecting to a resolved host, for all its addresses together, and again of a request with its reply.
   double timeout_s = 30;
   // Names and values, in each request to `headers_origin`. A name replaces a header of the client; repeated names are
   // all sent. Other servers do not get them: a document may name tiles anywhere, and a header may be a secret.

@@ -70,8 +70,7 @@ void AddScaleBar(const Frame& frame, std::string& svg) {
       20.0, kHeight - 24, km * pixels_per_km, 20 + km * pixels_per_km / 2, kHeight - 28, PlainNumber(km));
 }
 
-}  // namespace
-
+// A colour for a level, from violet for shallow ones to yellow for the deepest.
 std::string ColorOfLevel(int level, int shallowest, int deepest) {
   // Samples of the colour map viridis, whose brightness ascends: it is readable in greyscale.
   static constexpr std::array<std::array<int, 3>, 6> kMap = {
@@ -86,6 +85,8 @@ std::string ColorOfLevel(int level, int shallowest, int deepest) {
   };
   return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mix(0), mix(1), mix(2));
 }
+
+}  // namespace
 
 std::string MapOf(const std::set<std::tuple<int, std::int64_t, std::int64_t>>& tiles,
                   const std::vector<GeodeticPoint>& track) {

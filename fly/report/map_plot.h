@@ -15,7 +15,4 @@ namespace terrace::fly {
 std::string MapOf(const std::set<std::tuple<int, std::int64_t, std::int64_t>>& tiles,
                   const std::vector<GeodeticPoint>& track);
 
-// A colour for a level, from violet for shallow ones to yellow for the deepest.
-std::string ColorOfLevel(int level, int shallowest, int deepest);
-
 }  // namespace terrace::fly

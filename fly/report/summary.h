@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "fly/flight/flight.h"
@@ -18,8 +17,8 @@ struct Summary {
   int never_opened = 0, never_full = 0;               // clients
   double first_view_s = -1, worst_first_view_s = -1;  // median and worst of all clients; -1: never
   double arrival_s = -1;  // worst; -1: a client that opened the document had none after its flight
-  // Until tiles arrived; -1: never. Tiles that failed never did. One that was still waited for at the end counts with
-  // the time until then, if that is above the percentile of the others.
+  // How long tiles were waited for; -1: never arrived, as tiles that failed. A tile that is still awaited at the end
+  // counts with its wait so far if that exceeds the percentile of the others.
   double p50_s = 0, p99_s = 0, max_s = 0;
   double tiles_per_second = 0;       // mean over the seconds in which tiles arrived, were wanted or in flight
   double best_tiles_per_second = 0;  // in the best second

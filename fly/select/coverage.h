@@ -19,10 +19,10 @@ struct Coverage {
 };
 
 // Intersects each ray with the surface at the smallest height that is inside the height ranges of all tiles at that
-// point. Such a point is in the volumes of all these tiles, so that none of them may be culled. Does not count points
-// in fog, and points where an empty tile is drawn. Where no tile was selected, does not count points outside of a
-// height range either, and points where the deepest tile has children but none at that point: there the data end. Call
-// it after SelectTiles for the same frame.
+// point. Such a point is in the volumes of all these tiles, so that none of them may be culled. Points in fog, and
+// points where an empty tile is drawn, do not count. Where no tile was selected, neither do points outside of a height
+// range, and points where the deepest tile has children but none at that point: there the data end. Call it after
+// SelectTiles for the same frame.
 Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root);
 
 }  // namespace terrace::fly

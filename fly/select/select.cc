@@ -29,6 +29,9 @@ bool Selection::IsSettled() const {
 
 namespace {
 
+// If more descendants than this are missing, a tile is loaded before them.
+constexpr std::uint32_t kDescendantLimit = 20;
+
 // What a subtree reports to its root.
 struct Subtree {
   bool all_renderable = true;
@@ -136,7 +139,7 @@ Subtree Selector::Cull(Tile& tile, const Measures& measures) {
     Load(tile, LoadGroup::kNormal, measures);
     return Single(tile);
   }
-  if (options_.preload_siblings) Load(tile, LoadGroup::kPreload, measures);
+  Load(tile, LoadGroup::kPreload, measures);
   return {};
 }
 
@@ -188,7 +191,7 @@ bool Selector::DrawInsteadOfDescendants(Tile& tile, const Measures& measures, st
   Judge(tile, Verdict::kRendered);
   const bool renderable = tile.IsRenderable();
   const bool was_rendered = renderable && PreviousVerdict(tile, frame_) == Verdict::kRendered;
-  if (!was_rendered && subtree.missing > options_.descendant_limit && tile.content != Content::kStructure &&
+  if (!was_rendered && subtree.missing > kDescendantLimit && tile.content != Content::kStructure &&
       !tile.always_refine) {
     selection_.loads.resize(first_load);  // of the descendants; this tile shows something sooner
     if (!is_queued) Load(tile, LoadGroup::kNormal, measures);
@@ -228,12 +231,12 @@ Subtree Selector::VisitVisible(Tile& tile, const Measures& measures, bool suffic
   Subtree subtree = VisitChildren(tile, ancestor_suffices);
   const bool wants_kick = !subtree.all_renderable && !subtree.any_rendered_before;
   // Drawing a tile that is not loaded instead of its descendants would make a larger hole.
-  if (wants_kick && (subtree.missing > options_.descendant_limit || tile.IsRenderable())) {
+  if (wants_kick && (subtree.missing > kDescendantLimit || tile.IsRenderable())) {
     is_queued = DrawInsteadOfDescendants(tile, measures, first_drawn, first_load, is_queued, subtree);
   } else {
     Judge(tile, Verdict::kRefined);
   }
-  if (options_.preload_ancestors && !is_queued) Load(tile, LoadGroup::kPreload, measures);
+  if (!is_queued) Load(tile, LoadGroup::kPreload, measures);
   return subtree;
 }
 

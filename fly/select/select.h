@@ -19,10 +19,7 @@ namespace terrace::fly {
 
 struct SelectOptions {
   double max_error_px = 16;
-  double culled_error_px = 64;          // limit for tiles that are visited although they are culled, such as the root
-  std::uint32_t descendant_limit = 20;  // if more descendants than this are missing, the tile is loaded before them
-  bool preload_ancestors = true;
-  bool preload_siblings = true;
+  double culled_error_px = 64;  // limit for tiles that are visited although they are culled, such as the root
   bool forbid_holes = false;
 };
 

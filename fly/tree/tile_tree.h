@@ -30,7 +30,7 @@ class TileTree {
   // How the flight differs from that of cesium-native because of the document, for the report; empty: not at all.
   const std::string& note() const { return note_; }
 
-  // Whether the document offers tiles above level 0 of the quadtree of EPSG:4326.
+  // Whether the document offers tiles deeper than level 0 of the quadtree of EPSG:4326.
   bool has_finer_levels() const { return has_finer_levels_; }
 
   // Adds the children of a tile that is visited, as far as they are known by now.

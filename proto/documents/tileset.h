@@ -27,10 +27,10 @@ struct TilesetDescription {
 // tiles (cesium-native converts layer.json to 3D Tiles by the same factor).
 double GeometricError(int level);
 
-// UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and
-// .{SubtreeLevels}.subtree, so that an older tileset.json still works if the tree has another number of levels now.
-// Several roots become children of a tile without content. The schema is that of the subtrees' metadata
-// (proto/documents/subtree.h).
+// UTF-8 JSON. Templates are relative to the tileset: 3dtiles/ROOT/{level}/{x}/{y}.glb and
+// 3dtiles/ROOT/{level}/{x}/{y}.N.subtree (ROOT: RootName, N: SubtreeLevels), so that an older tileset.json still works
+// if the tree has another number of levels now. Several roots become children of a tile without content. The schema is
+// that of the subtrees' metadata (proto/documents/subtree.h).
 std::string EncodeTileset(const TilesetDescription& tileset);
 
 }  // namespace terrace::proto

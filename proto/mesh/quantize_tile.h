@@ -1,9 +1,7 @@
 // Quantizes the mesh over a tile's lattice to the integers of a quantized-mesh tile.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <vector>
 
 #include "engine/tin/mesh/tin_mesh.h"
 #include "proto/mesh/edge_steps.h"

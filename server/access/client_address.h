@@ -3,7 +3,6 @@
 
 #include <boost/asio/ip/address.hpp>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "config/config.h"

@@ -20,8 +20,7 @@ dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
 // kNotFound: the dataset has no imagery, and the format needs it.
 Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format);
 
-// ReadMapTile: TileFormatRow::read of the formats for maps calls it; the same errors. MapTileType: their
-// TileFormatRow::media_type.
+// TileFormatRow::read and TileFormatRow::media_type of the formats for maps.
 Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile);
 std::string_view MapTileType(const tiler::TileRequest& tile);
 

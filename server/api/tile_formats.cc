@@ -11,13 +11,13 @@
 
 #include "engine/core/check.h"
 #include "engine/core/parse_number.h"
-#include "engine/geo/error_ladder.h"
 #include "engine/geo/mercator_grid.h"
 #include "proto/format_error_up.h"
 #include "proto/mesh/tile_metadata.h"
 #include "server/api/map_formats.h"
 #include "server/http/text.h"
 #include "server/openapi/operations.h"
+#include "server/query/tile_query.h"
 #include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,7 +12,6 @@
 #include "proto/documents/picture_types.h"
 #include "proto/media_type.h"
 #include "server/api/request_context.h"
-#include "server/query/tile_query.h"
 #include "server/tiles/catalog.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"

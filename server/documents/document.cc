@@ -53,7 +53,7 @@ Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::C
   made.is_final = text.is_final;
   std::string& bytes = text.bytes;
   if (coding == tiler::Coding::kGzip) {
-    std::string compressed = proto::Gzip(bytes, proto::kGzipLevel, stop);
+    std::string compressed = proto::Gzip(bytes, stop);
     if (compressed.size() < bytes.size()) {
       made.coding = tiler::Coding::kGzip;
       bytes = std::move(compressed);

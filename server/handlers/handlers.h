@@ -20,16 +20,15 @@
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
 #include "server/api/request_context.h"
-#include "server/api/tile_formats.h"
 #include "server/asio/asio.h"
 #include "server/documents/document.h"
 #include "server/documents/static_files.h"
 #include "server/http/application.h"
 #include "server/jobs/worker_pool.h"
 #include "server/query/heights_query.h"
+#include "server/query/tile_query.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
-#include "tiler/area/area_mesh.h"
 
 namespace terrace::server {
 

@@ -17,7 +17,6 @@
 #include "engine/geo/ellipsoid.h"
 #include "proto/format_error_up.h"
 #include "server/api/caching.h"
-#include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"

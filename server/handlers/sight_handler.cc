@@ -10,10 +10,8 @@
 
 #include "engine/core/elapsed_time.h"
 #include "server/api/caching.h"
-#include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
-#include "server/http/http_error.h"
 #include "server/query/sight_query.h"
 #include "tiler/tile/strong_etag.h"
 

@@ -4,7 +4,6 @@
 #include <boost/asio/ip/address.hpp>
 #include <chrono>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

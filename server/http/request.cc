@@ -234,7 +234,7 @@ std::string OriginOf(std::string_view bytes) {
 
 }  // namespace
 
-Request FirstLineOf(std::string_view bytes) {
+Request RefusedRequestOf(std::string_view bytes) {
   Request request;
   request.method = Method::kOther;
   request.fields.Set(&RequestFields::origin, OriginOf(bytes));

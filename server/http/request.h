@@ -126,7 +126,7 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
 // The method and the beginning of the target from the first line of a message that is refused, as far as they can be
 // read; kOther and no target if they cannot. Of the fields, the Origin alone, which lets a page read the reply. For the
 // log and for the form of the reply. The request is not served.
-Request FirstLineOf(std::string_view bytes);
+Request RefusedRequestOf(std::string_view bytes);
 
 // The header of a connection's previous request, as bytes; none if that had a body or an unusual first line. For a next
 // request with the same header only the first line is parsed.

@@ -24,7 +24,7 @@ void RequestReader::EndSoon(Stream::Clock::time_point close_at) {
 
 asio::awaitable<RequestReader::HeadOutcome> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
   const auto refused = [&](BadRequest why) {
-    request = FirstLineOf(Unread());
+    request = RefusedRequestOf(Unread());
     return HeadOutcome(tl::unexpected(why));
   };
   // RFC 9112, section 2.2: empty lines before a request are ignored. They do not begin a request.

@@ -3,7 +3,6 @@
 // No header contains text of a request: names are literals; values are numbers, literals or ETags that the server made.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/ascii.h"
 #include "engine/core/names.h"
 #include "engine/core/nearest_name.h"
 #include "engine/core/result.h"
@@ -20,8 +21,6 @@ namespace terrace::server {
 
 // Removes `blanks` from both ends.
 std::string_view Trim(std::string_view text, std::string_view blanks = " \t");
-
-bool EqualsIgnoringCase(std::string_view a, std::string_view b);
 
 // Returns the text after "http://" or "https://", in upper or lower case; nothing if the text begins with neither.
 std::optional<std::string_view> AfterScheme(std::string_view text);

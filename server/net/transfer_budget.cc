@@ -151,7 +151,8 @@ bool TransferBudget::HasRoom(const HoldRequest& request) const {
   if (pool.takes_one) return pool.held == 0;
   if (pool.held + request.bytes > pool.capacity) return false;
   const std::size_t own = HeldBy(request.client, pool);
-  return number == kUploads || own == 0 || own + request.bytes <= kShare * (pool.capacity - pool.held - request.bytes);
+  return number == kUploads || own == 0 ||
+         own + request.bytes <= kHeldPerFree * (pool.capacity - pool.held - request.bytes);
 }
 
 // The oldest waiter of the client with the smallest claim.

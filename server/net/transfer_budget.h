@@ -52,7 +52,7 @@ class TransferBudget {
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::size_t kRate = std::size_t{1} << 20;
   static constexpr std::size_t kReserve = std::size_t{1} << 20;
-  static constexpr std::size_t kShare = 2;  // bytes that a client may hold, as a multiple of those left free
+  static constexpr std::size_t kHeldPerFree = 2;  // bytes that a client may hold, as a multiple of those left free
 
   // `now`: the clock.
   explicit TransferBudget(std::size_t capacity, std::function<Clock::time_point()> now = Clock::now);

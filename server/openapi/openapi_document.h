@@ -1,7 +1,6 @@
 // Writes the OpenAPI 3.1 document of a table of URLs. Pure.
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>

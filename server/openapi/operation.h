@@ -2,7 +2,6 @@
 // (server/api/tile_formats.cc) names its operation. Views of literals.
 #pragma once
 
-#include <cstdint>
 #include <string_view>
 #include <vector>
 

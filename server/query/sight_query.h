@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <optional>
 #include <stop_token>
-#include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"

@@ -18,6 +18,9 @@
 namespace terrace::server {
 namespace {
 
+// The variable of the environment with the password, if there is no file with it.
+constexpr const char* kSharedCachePassword = "TERRACE_SHARED_CACHE_PASSWORD";
+
 using std::chrono::milliseconds;
 
 // What the keys of this program's tiles begin with.

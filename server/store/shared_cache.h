@@ -6,16 +6,12 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "config/config.h"
 #include "engine/core/result.h"
 #include "tiler/store/tile_store.h"
 
 namespace terrace::server {
-
-// The variable of the environment with the password, if there is no file with it.
-inline constexpr const char* kSharedCachePassword = "TERRACE_SHARED_CACHE_PASSWORD";
 
 // Checks URL, password and certificates without connecting. kInvalidArgument: the URL is wrong. kUnavailable: a file
 // cannot be read. The message names the option, and has no password.

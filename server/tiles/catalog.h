@@ -4,7 +4,6 @@
 // a build that it starts: answers never mix two catalogs.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>

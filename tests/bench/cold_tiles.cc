@@ -71,7 +71,7 @@ Result<std::vector<tiler::Dataset>> Open(const Arguments& arguments) {
   if (!config) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", arguments.config, config.error()[0].message);
   for (const config::DatasetConfig& wanted : config->datasets) {
     if (wanted.name != arguments.dataset) continue;
-    auto dataset = cli::OpenDataset(wanted, cli::OpenCache(*config), "bench");
+    auto dataset = cli::OpenDataset(wanted, cli::OpenStatisticsCache(*config), "bench");
     if (!dataset) return tl::unexpected(dataset.error());
     return std::vector<tiler::Dataset>{*std::move(dataset)};
   }

@@ -16,6 +16,7 @@
 #include "server/http/text.h"
 #include "server/query/heights_query.h"
 #include "server/query/map_query.h"
+#include "server/query/tile_query.h"
 #include "server/routes.h"
 #include "server/telemetry/redact.h"
 #include "tests/fuzz/fuzz_input.h"

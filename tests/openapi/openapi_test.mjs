@@ -169,10 +169,10 @@ describe('/openapi.json', () => {
   });
 
   it('has the status codes of the manual', () => {
-    const listed = [...manual.matchAll(/^\| ([2-5]\d\d) \|/gm)].map((row) => row[1]);
+    const listed = new Set([...manual.matchAll(/^\| ([2-5]\d\d) \|/gm)].map((row) => row[1]));
     const documented = new Set(operations().flatMap(({ operation }) => Object.keys(operation.responses)));
     documented.add('204');  // OPTIONS has no operation
-    assert.deepEqual([...documented].sort(), listed.sort());
+    assert.deepEqual([...documented].sort(), [...listed].sort());
   });
 
   it('describes the reply to each of its examples', async () => {

@@ -63,10 +63,7 @@ std::string Waves(std::size_t size) {
 
 TEST(Gzip, ZlibReadsItBack) {
   for (std::size_t size : {0u, 1u, 100u, 70000u, 1000000u}) {
-    for (int level : {1, 6, 12}) {
-      const std::string bytes = Waves(size);
-      EXPECT_EQ(Gunzip(Gzip(bytes, level), size), bytes) << size << " bytes at level " << level;
-    }
+    EXPECT_EQ(Gunzip(Gzip(Waves(size)), size), Waves(size)) << size << " bytes";
   }
 }
 
@@ -95,10 +92,10 @@ TEST(Gzip, HeaderHoldsNeitherTimeNorName) {
 
 TEST(Gzip, MakesRepetitiveBytesSmaller) { EXPECT_LT(Gzip(Waves(50000)).size(), 10000u); }
 
-std::string OneShotBrotli(const std::string& bytes, int quality) {
+std::string OneShotBrotli(const std::string& bytes) {
   std::string out(BrotliEncoderMaxCompressedSize(bytes.size()), '\0');
   std::size_t size = out.size();
-  EXPECT_EQ(BrotliEncoderCompress(quality, BROTLI_DEFAULT_WINDOW, BROTLI_MODE_GENERIC, bytes.size(),
+  EXPECT_EQ(BrotliEncoderCompress(kBrotliQuality, BROTLI_DEFAULT_WINDOW, BROTLI_MODE_GENERIC, bytes.size(),
                                   reinterpret_cast<const std::uint8_t*>(bytes.data()), &size,
                                   reinterpret_cast<std::uint8_t*>(out.data())),
             BROTLI_TRUE);
@@ -109,7 +106,7 @@ std::string OneShotBrotli(const std::string& bytes, int quality) {
 TEST(Brotli, GivesTheBytesOfTheLibrarysOwnFunction) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{70'000}, kCompressedAtOnce - 1,
                                  kCompressedAtOnce, kCompressedAtOnce + 1, 3 * kCompressedAtOnce + 12'345}) {
-    EXPECT_TRUE(Brotli(Waves(size)) == OneShotBrotli(Waves(size), kBrotliQuality)) << size << " bytes";
+    EXPECT_TRUE(Brotli(Waves(size)) == OneShotBrotli(Waves(size))) << size << " bytes";
   }
 }
 
@@ -169,11 +166,11 @@ class WatchedText {
 };
 
 TEST(Compress, ReadsNoMoreThanAPieceAfterAStop) {
-  const std::pair<const char*, std::string (*)(std::string_view, int, const std::stop_token&)> functions[] = {
+  const std::pair<const char*, std::string (*)(std::string_view, const std::stop_token&)> functions[] = {
       {"gzip", Gzip}, {"br", Brotli}, {"zstd", Zstd}};
   for (const auto& [name, compress] : functions) {
     WatchedText watched;
-    EXPECT_EQ(compress(watched.text(), 4, watched.token()), "") << name;
+    EXPECT_EQ(compress(watched.text(), watched.token()), "") << name;
     EXPECT_TRUE(watched.token().stop_requested()) << name;
     EXPECT_LE(watched.read_after(), kCompressedAtOnce) << name;
   }

@@ -18,6 +18,7 @@
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh_error.h"
+#include "proto/gltf/mesh_file.h"
 #include "tiler/area/area_surface.h"
 #include "tiler/mesh/edit_limits.h"
 #include "tiler/mesh/restore_error_bound.h"

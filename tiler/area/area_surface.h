@@ -12,7 +12,6 @@
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "proto/error/tile_error.h"
-#include "proto/gltf/mesh_file.h"
 
 namespace terrace::tiler {
 

@@ -1,4 +1,4 @@
-// Makes the quantized mesh of a tile from heights and their refinement.
+// Makes the mesh of a tile from heights and their refinement, and quantizes it.
 #pragma once
 
 #include <chrono>
@@ -8,7 +8,6 @@
 #include "engine/core/result.h"
 #include "engine/dem/elevation_model.h"
 #include "engine/geo/ellipsoid.h"
-#include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"

@@ -36,9 +36,8 @@ class DrawnMesh {
  public:
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
-  // Looks only at the triangles of the position's bucket: where the plumb line meets one of them; nothing if it meets
-  // none, which is rare except near the tile's edge. If it meets several triangles, uses the one that it meets farthest
-  // inside.
+  // Where the plumb line meets a triangle of the position's bucket; of several, the one that it meets farthest inside.
+  // Nothing: it meets none, which is rare except near the tile's edge.
   std::optional<DrawnPoint> InOwnBucket(const dem::GeoPosition& point) const;
   // The same in the buckets around; on shallow levels among all triangles. A plumb line beside the mesh has the height
   // of the nearest point of the nearest triangle. Such lines exist because a tile's northern and southern edges are

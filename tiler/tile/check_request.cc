@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "engine/geo/error_ladder.h"
-#include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::tiler {

@@ -14,11 +14,11 @@ std::string Compress(std::string bytes, Coding coding, const std::stop_token& st
     case Coding::kIdentity:
       break;
     case Coding::kGzip:
-      return proto::Gzip(bytes, proto::kGzipLevel, stop);
+      return proto::Gzip(bytes, stop);
     case Coding::kBrotli:
-      return proto::Brotli(bytes, proto::kBrotliQuality, stop);
+      return proto::Brotli(bytes, stop);
     case Coding::kZstd:
-      return proto::Zstd(bytes, proto::kZstdLevel, stop);
+      return proto::Zstd(bytes, stop);
   }
   return bytes;
 }

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 
 #include "engine/geo/tile_key.h"
 #include "proto/documents/picture_types.h"

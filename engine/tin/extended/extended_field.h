@@ -11,10 +11,7 @@
 // Immutable after Make: safe to use from many threads at once.
 #pragma once
 
-#include <array>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "engine/core/color.h"

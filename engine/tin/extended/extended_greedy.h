@@ -11,12 +11,10 @@
 
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include "engine/tin/extended/extended_field.h"
-#include "engine/tin/mesh/candidate.h"
 #include "engine/tin/mesh/candidate_queue.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/mesh/triangulation.h"

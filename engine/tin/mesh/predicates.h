@@ -14,7 +14,7 @@
 
 namespace terrace::tin {
 
-// Width: each product is below S^2 = 2^30 in magnitude.
+// No overflow: each product is below S^2 = 2^30 in magnitude.
 constexpr std::int64_t Orientation(SamplePosition a, SamplePosition b, SamplePosition c) {
   const std::int64_t abx = b.x - a.x, aby = b.y - a.y;
   const std::int64_t acx = c.x - a.x, acy = c.y - a.y;

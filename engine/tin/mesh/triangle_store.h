@@ -13,7 +13,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "engine/tin/mesh/spare_blocks.h"
 #include "engine/tin/mesh/star.h"

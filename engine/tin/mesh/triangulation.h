@@ -7,13 +7,12 @@
 // An insertion removes a cavity, the set of triangles that the new point replaces, and joins the cavity's outline to
 // the point. The caller's criterion decides which triangles belong to the cavity. With the in-circle test the result is
 // Delaunay (Bowyer 1981, Watson 1981; the same triangles as Lawson's flips); with a test of errors it is
-// data-dependent. Four points on one circle keep their diagonal. All decisions are made in integers: the triangulation
-// depends on the sequence of insertions and on the criterion alone.
+// data-dependent. Four points on one circle keep their diagonal. All other decisions are made in integers: the
+// triangulation depends on the sequence of insertions and on the criterion alone.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -180,15 +179,15 @@ class Triangulation {
   std::vector<PendingEdge> pending_;  // stack, from 1 on
 };
 
-// Twice the area of (p, a, b). Width: two products below 2^30 (IsInsideCircle).
+// Twice the area of (p, a, b). No overflow: two products below 2^30 (IsInsideCircle).
 constexpr std::int32_t Cross(const RingVertex& a, const RingVertex& b) { return a.dx * b.dy - a.dy * b.dx; }
 
 // Whether the point p that u, v and w are relative to lies strictly inside the circle through v, u and w, which turn
 // counter-clockwise. This is the in-circle determinant in another form: p is inside if the angles at p and at
 // w over the chord (u, v) add up to more than half a turn, that is, if the sine of their sum, times four lengths, is
-// negative. Two of the four factors do not depend on w, so they are computed while w is loaded. Width: differences of
-// coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, with a margin of about 2^17, and
-// the sum of two products is below 2^63.
+// negative. Two of the four factors do not depend on w, so they are computed while w is loaded. No overflow:
+// differences of coordinates are below S = 2^15, so each factor is below 2 S^2 = 2^31 in magnitude, with a margin of
+// about 2^17, and the sum of two products is below 2^63.
 constexpr bool IsInsideCircle(const RingVertex& v, const RingVertex& u, const RingVertex& w) {
   const std::int32_t ax = u.dx - w.dx, ay = u.dy - w.dy, bx = v.dx - w.dx, by = v.dy - w.dy;
   const std::int32_t sine_at_p = u.dx * v.dy - u.dy * v.dx, cosine_at_p = u.dx * v.dx + u.dy * v.dy;

@@ -160,7 +160,7 @@ void AddPlanning(CLI::App& command, BakeArguments& arguments) {
                 "Bakes nothing: prints levels, tiles, files, bytes and core-hours, from a few tiles that are built")
       ->group(kPlanning);
   command
-      .add_option("--catalogue", arguments.catalogue,
+      .add_option("--catalogue", arguments.cell_list,
                   "With --dry-run, instead of DEMs: a list of one-degree cells such as N46E008, one on each line")
       ->type_name("FILE")
       ->group(kPlanning);

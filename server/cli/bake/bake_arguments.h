@@ -30,7 +30,7 @@ struct BakeArguments {
   std::string queue, job, queue_password_file, queue_ca;  // empty: not given
   double lease = 30, queue_timeout = 10;                  // seconds
   bool finish = false, dry_run = false, json = false, yes = false, no_gzip = false;
-  std::string catalogue;
+  std::string cell_list;  // file (bake/cell_list.h); empty: not given
   double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
   bool has_assumptions = false;                                   // whether one of these three is given
   std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key

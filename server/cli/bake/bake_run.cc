@@ -35,7 +35,6 @@
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
-#include "tiler/encoder_version.h"
 #include "tiler/tile/build_id.h"
 
 namespace terrace::cli {
@@ -48,13 +47,13 @@ int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
 // Only ranges of tiles are made: no raster is opened.
 int PlanFromCells(const BakeArguments& arguments, const bake::BakeRequest& request) {
   constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
-  const Result<std::string> cells = archive::ReadFile(arguments.catalogue, kMaxBytes);
+  const Result<std::string> cells = archive::ReadFile(arguments.cell_list, kMaxBytes);
   if (!cells) {
     return cli::Fail(cells.error().message + "; give a file with a cell such as N46E008 on each line", kExitFailure);
   }
   constexpr double kErrorFraction = 0.5;
   auto tiles = bake::PlanCells(*cells, arguments.arc_seconds, kErrorFraction);
-  if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
+  if (!tiles) return cli::Fail(arguments.cell_list + ": " + tiles.error().message, kExitUsage);
   const int deepest = static_cast<int>(tiles->size()) - 1;
   if (request.levels && (request.levels->first > 0 || request.levels->second > deepest)) {
     return cli::Fail(
@@ -83,7 +82,7 @@ Result<tiler::Dataset> OpenDataset(const BakeArguments& arguments, const BakeInp
   if (const auto readable = CheckReadable(input.dataset); !readable) return tl::unexpected(readable.error());
   if (const auto allowed = CheckSourcePolicy(input.dataset); !allowed) return tl::unexpected(allowed.error());
   dem::SetGdalCache(input.config.gdal_cache_bytes);
-  const dem::RasterCache cache = OpenCache(input.config);
+  const dem::RasterCache cache = OpenStatisticsCache(input.config);
   Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(input.dataset.sources),
                     FileCount(input.dataset.sources));
   auto dataset = cli::OpenDataset(input.dataset, cache, TERRACE_VERSION, progress.Callback(), signals.token());
@@ -369,7 +368,7 @@ void WarnAboutUnusedError(const BakeArguments& arguments, const tiler::Dataset& 
 // Combinations that make no sense; empty: none.
 std::string WrongTogether(const BakeArguments& arguments) {
   const auto given = [](const std::string& text) { return !text.empty(); };
-  if (given(arguments.catalogue)) {
+  if (given(arguments.cell_list)) {
     if (!arguments.dry_run) return "--catalogue plans without sources: give --dry-run with it";
     if (!arguments.dems.empty() || given(arguments.config)) return "--catalogue stands for the sources; give no DEM";
     if (arguments.format != "terrain" || arguments.form != kChunks || arguments.no_gzip || arguments.finish ||
@@ -456,7 +455,7 @@ int Bake(const BakeArguments& given) {
   if (!codings) return Fail(codings.error());
   const auto shard = ShardOf(arguments.shard);
   if (!shard) return Fail(shard.error());
-  if (!arguments.catalogue.empty()) return PlanFromCells(arguments, *request);
+  if (!arguments.cell_list.empty()) return PlanFromCells(arguments, *request);
 
   std::vector<config::ConfigError> errors;
   const auto input = InputOf(arguments, errors);

@@ -8,6 +8,21 @@
 namespace terrace::cli {
 namespace {
 
+// Wraps `text` at blanks into lines of at most `width` characters. Longer words stay whole.
+std::string WrapLines(const std::string& text, std::size_t width) {
+  std::string wrapped;
+  std::size_t line = 0;  // its length so far
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    const bool fits = line == 0 || line + 1 + end - at <= width;
+    if (!wrapped.empty()) wrapped += fits ? ' ' : '\n';
+    line = fits && line > 0 ? line + 1 + end - at : end - at;
+    wrapped += text.substr(at, end - at);
+    at = end + 1;
+  }
+  return wrapped;
+}
+
 constexpr std::size_t kLine = 100, kColumn = 30;
 
 std::string Others(const char* how, const std::set<CLI::Option*>& others) {
@@ -42,19 +57,5 @@ class HelpFormat final : public CLI::Formatter {
 }  // namespace
 
 void SetHelpFormat(CLI::App& program) { program.formatter(std::make_shared<HelpFormat>()); }
-
-std::string WrapLines(const std::string& text, std::size_t width) {
-  std::string wrapped;
-  std::size_t line = 0;  // its length so far
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find(' ', at), text.size());
-    const bool fits = line == 0 || line + 1 + end - at <= width;
-    if (!wrapped.empty()) wrapped += fits ? ' ' : '\n';
-    line = fits && line > 0 ? line + 1 + end - at : end - at;
-    wrapped += text.substr(at, end - at);
-    at = end + 1;
-  }
-  return wrapped;
-}
 
 }  // namespace terrace::cli

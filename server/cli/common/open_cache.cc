@@ -14,7 +14,7 @@
 
 namespace terrace::cli {
 
-dem::RasterCache OpenCache(const config::Config& config) {
+dem::RasterCache OpenStatisticsCache(const config::Config& config) {
   dem::RasterCache cache;
   cache.memory = std::make_shared<dem::AveragesBudget>();
   const auto none = [&](const std::string& why) {
@@ -24,7 +24,7 @@ dem::RasterCache OpenCache(const config::Config& config) {
   if (config.cache_dir.empty() || config.cache_dir_bytes == 0) return none("as the configuration says");
   std::string place = config.cache_dir;
   if (place == config::kDefaultCacheDir) {
-    place = config::DefaultCachePlace();
+    place = config::DefaultCacheDir();
     if (place.empty()) return none("as neither CACHE_DIRECTORY nor XDG_CACHE_HOME nor HOME names a folder");
     std::error_code unknown;
     const bool exists = std::filesystem::is_directory(place, unknown);

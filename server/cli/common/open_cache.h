@@ -8,6 +8,6 @@ namespace terrace::cli {
 
 // Uses cache_dir and cache_dir_bytes, and logs both. If the default folder cannot be created, there is no cache; a
 // configured folder is tried again with each source.
-dem::RasterCache OpenCache(const config::Config& config);
+dem::RasterCache OpenStatisticsCache(const config::Config& config);
 
 }  // namespace terrace::cli

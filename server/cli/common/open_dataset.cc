@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "engine/gdal/file_content.h"
 #include "engine/statistics/cache_folder.h"
 #include "server/cli/common/open_baked.h"
 

@@ -219,7 +219,7 @@ int Info(const InfoArguments& arguments) {
   for (const auto& [key, text] : cache_flags) config::SetServerOption(key, text, directory, config, wrong);
   if (!wrong.empty()) return Fail(wrong);
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
-  const dem::RasterCache cache = OpenCache(config);
+  const dem::RasterCache cache = OpenStatisticsCache(config);
   std::string problem;
   nlohmann::json all = nlohmann::json::array();
   const auto datasets = Datasets(dems, mosaic, exit_code);

@@ -16,7 +16,6 @@
 #include "engine/sources/read_raster.h"
 #include "engine/tin/extended/extended_error.h"
 #include "engine/tin/extended/extended_field.h"
-#include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/option_checks.h"
 #include "server/cli/common/progress.h"

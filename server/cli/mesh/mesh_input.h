@@ -4,7 +4,6 @@
 #include <functional>
 #include <string>
 
-#include "engine/dem/elevation_model.h"
 #include "engine/sources/read_raster.h"
 
 namespace CLI {

@@ -2,7 +2,6 @@
 // the server need not wait for them.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <mutex>

@@ -89,7 +89,7 @@ ServeRun::ServeRun(const ServeArguments& arguments, const config::Config& config
 
 Result<void> ServeRun::Start(server::ServerOptions options, std::size_t store_files) {
   if (auto opened = OpenTiers(store_files, options); !opened) return opened;
-  cache_ = OpenCache(config_);
+  cache_ = OpenStatisticsCache(config_);
   options.cache_problem = [folder = cache_.folder] { return folder ? folder->problem() : std::string(); };
   options.progress_of = [shares = shares_](const std::string& dataset) { return shares->Of(dataset); };
   HandleEvents(options);

@@ -54,7 +54,7 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
   BlockRange range;
   for (const GridMember& member : grid.members()) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
-    range.Add(member.raster->statistics()->table.Query(west - x, north - y, east - x, south - y));
+    range.Add(member.raster->statistics()->ranges.Query(west - x, north - y, east - x, south - y));
   }
   return range;
 }

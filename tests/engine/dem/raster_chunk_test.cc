@@ -10,7 +10,7 @@ namespace {
 
 std::string WideBlocksOf(const std::string& path) {
   const auto source = OpenOrFail(path);
-  return source ? source->info().sources.front().wide_blocks : "not opened";
+  return source ? source->info().sources.front().blocks_too_wide : "not opened";
 }
 
 TEST(RasterChunk, SaysWhenChunksDecodeWideBlocksAgainAndAgain) {

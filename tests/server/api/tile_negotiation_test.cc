@@ -8,6 +8,7 @@
 #include "engine/geo/error_ladder.h"
 #include "proto/mesh/skirt.h"
 #include "server/api/tile_formats.h"
+#include "server/query/tile_query.h"
 #include "tests/server/test_context.h"
 
 namespace terrace::server {

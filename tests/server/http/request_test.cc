@@ -214,24 +214,25 @@ TEST(HeadEnd, RefusesLinesWithoutCr) {
 }
 
 TEST(FirstLine, IsToldOfWhatIsRefused) {
-  const Request head = FirstLineOf("HEAD /maui/layer.json?token=secret-1&x=1 HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n");
+  const Request head =
+      RefusedRequestOf("HEAD /maui/layer.json?token=secret-1&x=1 HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n");
   EXPECT_EQ(head.method, Method::kHead);
   EXPECT_EQ(head.method_name, "HEAD");
   EXPECT_EQ(head.target, "/maui/layer.json?token=secret-1&x=1");
   EXPECT_TRUE(head.is_private);
   EXPECT_EQ(head.fields->origin, "");
-  EXPECT_EQ(FirstLineOf("GET / HTTP/1.1\r\nHost: a\r\nORIGIN: https://a \r\nHost: b\r\n\r\n").fields->origin,
+  EXPECT_EQ(RefusedRequestOf("GET / HTTP/1.1\r\nHost: a\r\nORIGIN: https://a \r\nHost: b\r\n\r\n").fields->origin,
             "https://a");
   for (const char* several : {"GET / HTTP/1.1\r\nOrigin: a\r\nOrigin: b\r\n\r\n", "GET / HTTP/1.1\r\n\r\nOrigin: a\r\n",
                               "GET / HTTP/1.1\r\nOrigin: a"}) {
-    EXPECT_EQ(FirstLineOf(several).fields->origin, "") << several;
+    EXPECT_EQ(RefusedRequestOf(several).fields->origin, "") << several;
   }
-  const Request cut = FirstLineOf("GET /" + std::string(100, 'a'));
+  const Request cut = RefusedRequestOf("GET /" + std::string(100, 'a'));
   EXPECT_EQ(cut.method, Method::kGet);
   EXPECT_EQ(cut.target, "/" + std::string(100, 'a'));
   for (const char* bytes : {"", "GET", "get / HTTP/1.1\r\n", "\x16\x03\x01 \x01\r\n", " / HTTP/1.1\r\n"}) {
-    EXPECT_EQ(FirstLineOf(bytes).method, Method::kOther) << bytes;
-    EXPECT_EQ(FirstLineOf(bytes).method_name, "") << bytes;
+    EXPECT_EQ(RefusedRequestOf(bytes).method, Method::kOther) << bytes;
+    EXPECT_EQ(RefusedRequestOf(bytes).method_name, "") << bytes;
   }
 }
 

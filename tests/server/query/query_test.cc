@@ -2,6 +2,7 @@
 
 #include "server/api/tile_formats.h"
 #include "server/http/text.h"
+#include "server/query/tile_query.h"
 
 namespace terrace::server {
 namespace {
