@@ -71,8 +71,9 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {.key = "attribution",
        .value = "TEXT",
        .help = "Attribution shown by clients",
-       .details = "One line of text or HTML, such as a link to the license. Clients take it as HTML, so `<` and `&` are "
-                  "written `&lt;` and `&amp;`",
+       .details =
+           "One line of text or HTML, such as a link to the license. Clients take it as HTML, so `<` and `&` are "
+           "written `&lt;` and `&amp;`",
        .codec = OneLine(&DatasetConfig::attribution),
        .other_words = "copyright credit credits license licence"},
       {.key = "error_fraction",
