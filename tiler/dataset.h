@@ -61,7 +61,8 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   // N: on request, the quantized-mesh tiles of levels 0, N, 2N, ... have the metadata extension, which lists the tiles
-  // of the N levels below; tiles without such descendants have none from max_source_level() on. 0: no tile has it.
+  // of the N levels below. On level max_source_level() and deeper ones, a tile without children has no metadata. 0: no
+  // tile has it.
   int metadata_availability = 0;
   // Identifies the dataset and its contents, edits included. If a cache outlives the pipeline or serves several, set it
   // to GenerationOf(dataset, model->fingerprint()). If it is left at 0, TilePipeline sets it to the dataset's position,

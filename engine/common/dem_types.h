@@ -38,8 +38,9 @@ enum class HoleFill : std::uint8_t {
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
-// returns them as stated if it returns all sources that the edit touches (for kSource also the floor) in this datum.
-// Otherwise they are converted to the ellipsoid and back, which may change them by millimetres.
+// returns them unchanged if, in this read, the heights of all sources that the edit touches (with kSource also the
+// floor) have the edit's datum. Otherwise they are converted to the ellipsoid and back, which may change them by
+// millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid

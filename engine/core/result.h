@@ -1,8 +1,8 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
 // Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
 // errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Functions that
-// read, build or encode may throw two exceptions: std::bad_alloc, and ThrownError where the statistics of a source that
-// memory does not hold can no longer be read from the cache folder or computed again.
+// read, build or encode may throw two exceptions: std::bad_alloc; and ThrownError, if statistics of a source that are
+// not kept in memory can neither be read from the cache folder nor computed again.
 #pragma once
 
 #include <fmt/core.h>

@@ -67,8 +67,8 @@ class ElevationModel::Impl {
   Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
   // Of an edit with orthometric heights. dem_edit_datum.cc.
   Result<std::string> AddUndulations(Edit& edit) const;
-  // Whether reads in `datum` return all heights that an edit with this reach may touch above `geoid` (GeoidIn).
-  // dem_edit_datum.cc.
+  // Whether, in reads in `datum`, all heights that an edit with this reach may touch count from `geoid` (GeoidIn):
+  // those of the sources there, and with kSource the floor. dem_edit_datum.cc.
   bool AreHeightsAbove(const std::string& geoid, HeightDatum datum, const Box& reach) const;
   // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.

@@ -88,8 +88,8 @@ struct Edit {
   EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
   // Added to orthometric heights. Null until the sources are known, and for heights above the ellipsoid.
   std::shared_ptr<const EditUndulations> undulations;
-  // Whether HeightDatum::kSource (or kOrthometric) has, everywhere within the edit's reach, the zero that the edit's
-  // heights, or those of its replacement, are stated from. ElevationModel sets it.
+  // Whether HeightDatum::kSource (or kOrthometric) is, everywhere within the edit's reach, the datum in which the edit
+  // or its replacement states heights. ElevationModel sets it.
   bool is_in_source_datum = false, is_in_orthometric = false;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision

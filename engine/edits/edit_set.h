@@ -34,7 +34,8 @@ using EditRows = std::unordered_map<std::size_t, EditRow>;
 // The datum of heights that are edited.
 struct EditedDatum {
   HeightDatum datum = HeightDatum::kEllipsoid;
-  // Of its zero above the ellipsoid, metres, by node. Empty if no edit needs them (Edit::TargetDatum).
+  // The height of the datum's zero above the ellipsoid, metres, by node. Empty if no edit needs them
+  // (Edit::TargetDatum).
   std::span<const double> undulations = {};
 };
 

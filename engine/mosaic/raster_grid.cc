@@ -255,7 +255,7 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   const int gap = options_.max_void_gap / factor;
   if (gap < 2 || bridged.voids == 0) return bridged;
   const GridWindow voids = HullOfVoids(bridged.heights, window), wide = Grown(voids, gap, factor);
-  const auto around = ReadAround(factor, wide, window, bridged.heights, stop);
+  const auto around = ReadWithKnown(factor, wide, window, bridged.heights, stop);
   if (!around) return tl::unexpected(around.error());
   if (std::ranges::all_of(*around, IsVoid)) return bridged;
   std::vector<float> filled = FillVoids(*around, wide, voids, gap);
@@ -264,9 +264,9 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   return bridged;
 }
 
-// ReadAverages of `wide`, a part of which was read: `known`, of the window `core`.
-Result<std::vector<float>> RasterGrid::ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
-                                                  const std::vector<float>& known, const std::stop_token& stop) const {
+Result<std::vector<float>> RasterGrid::ReadWithKnown(int factor, const GridWindow& wide, const GridWindow& core,
+                                                     const std::vector<float>& known,
+                                                     const std::stop_token& stop) const {
   std::vector<float> all(static_cast<std::size_t>(wide.columns * wide.rows));
   const std::int64_t west = std::max(wide.column, core.column), north = std::max(wide.row, core.row);
   const std::int64_t east = std::min(wide.column + wide.columns, core.column + core.columns);
@@ -411,16 +411,16 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
   if (traces_others) {
     std::vector<std::uint8_t> others(inside.size());
     for (std::size_t n = 0; n < others.size(); ++n) others[n] = inside[n] & (wanted[n] ^ std::uint8_t{1});
-    TraceOthers(others, bridged->heights, samples, undulations, *reading);
+    AddReadingsOfOthers(others, bridged->heights, samples, undulations, *reading);
   }
   if (bridged->voids == 0) reading->samples = std::move(bridged->heights);  // not copied: nothing was filled
   return {};
 }
 
 // Traces nodes whose heights came from other raster grids, as far as this raster grid's samples were read.
-void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
-                             const std::vector<float>& filled, std::span<const double> undulations,
-                             GridReading& reading) const {
+void RasterGrid::AddReadingsOfOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
+                                     const std::vector<float>& filled, std::span<const double> undulations,
+                                     GridReading& reading) const {
   const GridWindow& window = reading.window;
   const auto stride = static_cast<std::size_t>(reading.cells.window().columns);
   for (std::size_t node = 0; node < others.size(); ++node) {

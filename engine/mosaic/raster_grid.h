@@ -192,13 +192,15 @@ class RasterGrid {
   // `measured`: unless null, becomes the window before filling; is not changed if there are no voids.
   Result<Bridged> ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
                               std::vector<float>* measured = nullptr) const;
-  Result<std::vector<float>> ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
-                                        const std::vector<float>& known, const std::stop_token& stop) const;
+  // ReadAverages of `wide`, a part of which was read before: `known`, of the window `core`.
+  Result<std::vector<float>> ReadWithKnown(int factor, const GridWindow& wide, const GridWindow& core,
+                                           const std::vector<float>& known, const std::stop_token& stop) const;
   // The window of ReadBridged with smooth surfaces in the holes that are left (grid_holes.cc); empty where there are
   // none. Precondition: `bridged` is what ReadBridged gives.
   Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                        const std::stop_token& stop) const;
-  // `is_guess`: for the first guess of a finer factor; averages beside a hole then count as part of it.
+  // `is_guess`: the result is the first guess for the same holes by the next finer factor (GuessLarge). Averages beside
+  // a hole then count as part of the hole.
   Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,
                                         const std::stop_token& stop) const;
   Result<WindowWithHoles> ReadWithHoles(int factor, const GridWindow& window, bool is_guess,
@@ -220,8 +222,11 @@ class RasterGrid {
   Result<void> FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,
                            std::span<const double> undulations, int factor, const NodeHeights& nodes,
                            const std::stop_token& stop, GridReading* reading = nullptr) const;
-  void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
-                   const std::vector<float>& filled, std::span<const double> undulations, GridReading& reading) const;
+  // Sets the heights of `reading` at nodes that other raster grids have filled (`others`: 1), as far as the samples of
+  // this grid were read there.
+  void AddReadingsOfOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
+                           const std::vector<float>& filled, std::span<const double> undulations,
+                           GridReading& reading) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north
   // Returns the blend weight of each sample in the window, 0 to 1; empty: all are 1.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;

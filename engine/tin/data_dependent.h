@@ -2,7 +2,8 @@
 //
 //        w           Garland and Heckbert (1997), section 3.4. Around a new vertex p, an edge (u, v) of the cavity's
 //       / \          outline is suspect: the quadrilateral (p, u, w, v) with the triangle beyond it is cut by u-v or by
-//      /   \         p-w, and the edges that take its place are suspect in turn. Spokes (edges at p) are not.
+//      /   \         p-w. If by p-w, u-w and w-v take the place of u-v, and are suspect in turn. Spokes (edges at p)
+//      are not.
 //     u-----v
 //      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
 //        p               p-w is taken if S(u-v) < q^2 S(p-w),

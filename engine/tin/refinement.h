@@ -5,7 +5,7 @@
 // with its sample, the error before it, the ring of vertices that the sample was joined to, and, for each triangle it
 // made, the later insertion that removed this triangle. The mesh after n insertions consists of the triangles made by
 // one of the first n insertions and removed by none of them. Finding them takes no geometry. Indices have 16 bits, so
-// that a refinement stays small: no larger run has one.
+// that a refinement stays small: a run that exceeds kMaxVertices or kMaxStar has none.
 //
 // Immutable; safe to read from many threads at once.
 #pragma once

@@ -52,7 +52,7 @@ const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat p
 Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
 // kNotFound: the dataset has no sources and its archive has no tiles of this format; or the format is in Web Mercator
-// and the dataset lies beyond the latitudes of that projection.
+// and the dataset, or its image for kImagery, lies beyond the latitudes of that projection.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
 
 // Checks that an archive has the tiles of this format that `query` asks for: a document that appends `query` to its

@@ -109,8 +109,7 @@ void TransferBudget::Age(Share& share, Clock::time_point now) {
   share.as_of = now;
 }
 
-// The client's recent use plus what it may use before it is late, in steps.
-std::uint64_t TransferBudget::Claim(std::uint64_t client, const Pool& pool, Clock::time_point now) {
+std::uint64_t TransferBudget::ClaimOf(std::uint64_t client, const Pool& pool, Clock::time_point now) {
   const auto own = pool.shares.find(client);
   if (own == pool.shares.end()) return 0;
   Share share = own->second;
@@ -124,7 +123,7 @@ std::uint64_t TransferBudget::Claim(std::uint64_t client, const Pool& pool, Cloc
 TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now) {
   if (pool.shares.size() >= pool.sweep_at) {
     std::erase_if(pool.shares,
-                  [&](const auto& other) { return other.second.holds == 0 && Claim(other.first, pool, now) == 0; });
+                  [&](const auto& other) { return other.second.holds == 0 && ClaimOf(other.first, pool, now) == 0; });
     pool.sweep_at = 2 * pool.shares.size() + 64;
   }
   Share& share = pool.shares[client];
@@ -141,7 +140,7 @@ bool TransferBudget::MayTake(const HoldRequest& request, Clock::time_point now, 
   if (waiters_.empty()) return true;
   const Waiter* next = NextWaiter(number, now);
   if (next == nullptr || next == waiter) return true;
-  return Claim(request.client, pool, now) < Claim(next->request.client, pool, now);
+  return ClaimOf(request.client, pool, now) < ClaimOf(next->request.client, pool, now);
 }
 
 // Whether the memory suffices for the request, whoever else waits.
@@ -161,7 +160,7 @@ TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t pool, Clock::time
   std::uint64_t least = 0;
   for (Waiter* waiter : waiters_) {
     if (PoolOf(waiter->request) != pool) continue;
-    const std::uint64_t claim = Claim(waiter->request.client, pools_[pool], now);
+    const std::uint64_t claim = ClaimOf(waiter->request.client, pools_[pool], now);
     if (next == nullptr || claim < least) {
       next = waiter;
       least = claim;

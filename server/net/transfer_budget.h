@@ -16,7 +16,7 @@
 //   client: its late replies are cut off.
 // - A waiting upload takes memory from the client that holds most, if it holds more than the waiting client would: its
 //   newest upload is displaced. Else the late uploads of all other clients are displaced.
-// - Bodies of one client wait for one another.
+// - A waiting body takes no memory from other bodies of its own client, unless it is a reply about the server's state.
 //
 // Replies about the server's state, for operators, may exceed all pools by kReserve: they matter most when memory is
 // short.
@@ -125,7 +125,9 @@ class TransferBudget {
   // mutex_ is held, as for the following.
   static std::size_t HeldBy(std::uint64_t client, const Pool& pool);
   static void Age(Share& share, Clock::time_point now);
-  static std::uint64_t Claim(std::uint64_t client, const Pool& pool, Clock::time_point now);
+  // A client's recent use plus what it may use before it is late, in steps. The oldest waiter of the client with the
+  // smallest claim is next.
+  static std::uint64_t ClaimOf(std::uint64_t client, const Pool& pool, Clock::time_point now);
   static Share& ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now);
   bool HasRoom(const HoldRequest& request) const;
   bool MayTake(const HoldRequest& request, Clock::time_point now, const Waiter* waiter) const;

@@ -8,7 +8,7 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 #include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {

@@ -12,7 +12,7 @@
 #include "server/http/text.h"
 #include "server/query/drawn_parameters.h"
 #include "server/query/heights_parameters.h"
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 
 namespace terrace::server {
 namespace {

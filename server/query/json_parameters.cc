@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 
 namespace terrace::server {
 namespace {

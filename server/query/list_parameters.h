@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "engine/core/result.h"
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 
 namespace terrace::server {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 
 namespace terrace::server {
 
@@ -22,7 +22,7 @@ bool IsPointsBody(std::string_view content_type);
 bool IsBinaryBody(std::string_view content_type);
 
 // Passes the parameters of the query and of the body, unless it is binary, to a sink. Errors: those of the readers
-// (parameters.h) and of the sink; those of the body name its byte.
+// (streamed_parameters.h) and of the sink; those of the body name its byte.
 Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, ParameterSink& parameters);
 
 }  // namespace terrace::server

@@ -9,8 +9,8 @@
 #include "server/http/text.h"
 #include "server/query/drawn_parameters.h"
 #include "server/query/list_parameters.h"
-#include "server/query/parameters.h"
 #include "server/query/points_input.h"
+#include "server/query/streamed_parameters.h"
 
 namespace terrace::server {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "server/query/heights_parameters.h"
 #include "server/query/heights_query.h"
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 #include "tests/server/handlers/allocations.h"
 
 namespace terrace::server {

@@ -1,4 +1,4 @@
-#include "server/query/parameters.h"
+#include "server/query/streamed_parameters.h"
 
 #include <algorithm>
 #include <utility>
