@@ -9,6 +9,7 @@
 #include <list>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <thread>
 #include <utility>
 

@@ -16,6 +16,7 @@ namespace terrace::proto {
 // The levels take a tenth of a tile's build and reach most of the possible compression. Brotli takes twice the time
 // from quality 5 on and saves a thousandth.
 inline constexpr int kGzipLevel = 6, kBrotliQuality = 4, kZstdLevel = 6;
+static_assert(kGzipLevel <= 9, "zlib has no more");
 
 // Bytes that are compressed between two checks of the stop token: about ten milliseconds.
 inline constexpr std::size_t kCompressedAtOnce = std::size_t{1} << 20;
@@ -46,7 +47,7 @@ std::string Brotli(std::string_view bytes, const std::stop_token& stop = {});
 // RFC 8878 zstd, one frame, without a checksum. Thread-safe.
 std::string Zstd(std::string_view bytes, const std::stop_token& stop = {});
 
-// RFC 1950 zlib, as in PNG, by libdeflate in one call. Thread-safe.
+// RFC 1950 zlib, as in PNG, by libdeflate in one call, at kGzipLevel. Thread-safe.
 std::string Zlib(std::string_view bytes);
 
 }  // namespace terrace::proto

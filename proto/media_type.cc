@@ -1,5 +1,7 @@
 #include "proto/media_type.h"
 
+#include <algorithm>
+
 #include "engine/core/ascii.h"
 
 namespace terrace::proto {

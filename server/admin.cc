@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <stop_token>
 #include <string_view>
 #include <utility>
 

@@ -13,7 +13,7 @@ std::string FolderOf(const char* variable) {
 
 }  // namespace
 
-std::string DefaultCacheDir() {
+std::string CacheDirFromEnvironment() {
   if (const std::string folders = FolderOf("CACHE_DIRECTORY"); !folders.empty()) {
     return folders.substr(0, folders.find(':'));
   }

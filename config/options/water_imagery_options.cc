@@ -63,9 +63,8 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
       {.key = "attribution",
        .value = "TEXT",
        .help = "Attribution of the image, for maps and in textured tiles",
-       .details = "One line of text or HTML. In these tiles it follows the dataset's attribution in `asset.copyright`; "
-                  "CesiumJS "
-                  "can show it",
+       .details = "One line of text or HTML, as of a dataset. In these tiles it follows the dataset's attribution in "
+                  "`asset.copyright`; CesiumJS can show it",
        .codec = OneLine(&ImageryConfig::attribution)},
       {.key = "texture",
        .value = "FORMAT",

@@ -262,7 +262,7 @@ Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenFromCache(std::vecto
 }
 
 Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFile> files, const DemOptions& options,
-                                                               bool only_cached) {
+                                                               bool only_cached) try {
   if (files.empty()) return MakeError(ErrorCode::kInvalidArgument, "an elevation model needs a source");
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
@@ -299,6 +299,8 @@ Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFi
   impl->contents = *std::move(contents);
   if (auto opened = impl->OpenEdits(options); !opened) return tl::unexpected(std::move(opened).error());
   return std::unique_ptr<ElevationModel>(new ElevationModel(std::move(impl)));
+} catch (const ThrownError& thrown) {  // of statistics that are read again
+  return tl::unexpected(thrown.error());
 }
 
 const DemInfo& ElevationModel::info() const { return impl_->info; }

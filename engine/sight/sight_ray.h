@@ -29,8 +29,8 @@ struct SightAnswer {
   // NaN: there is no surface anywhere along the ray.
   double clearance_m = std::numeric_limits<double>::quiet_NaN();
   double clearance_at = 0;  // as a share of the ray's length
-  std::optional<double>
-      blocked_at;         // the first place more than kSightTolerance below the surface, a share of the length
+  // The first place more than kSightTolerance below the surface, as a share of the ray's length.
+  std::optional<double> blocked_at;
   bool has_gaps = false;  // parts of the ray are above places without a height
 };
 

@@ -62,7 +62,13 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.available = dataset.model->Availability();
   view.bounds = info.bounds;
   view.heights = info.heights;
-  view.range_bound = [pipeline, &model = *dataset.model](const geo::TileKey& key) { return model.RangeBound(key); };
+  view.range_bound = [pipeline, &model = *dataset.model](const geo::TileKey& key) -> Result<dem::HeightRange> {
+    try {
+      return model.RangeBound(key);
+    } catch (const ThrownError& thrown) {
+      return tl::unexpected(thrown.error());
+    }
+  };
   if (info.edits > 0) {
     view.edits_hash = [pipeline, &model = *dataset.model](const tiler::TileRequest& request) {
       return tiler::TileEditsHash(model, request);

@@ -1,3 +1,2 @@
-// Attributions are text or HTML, for clients that show them as HTML. The page shows their text: an image or a script in one
-// is not loaded.
+// Attributions are text or HTML, for clients that show them as HTML. The page shows their text.
 export const textOf = (attribution) => new DOMParser().parseFromString(attribution ?? "", "text/html").body.textContent;

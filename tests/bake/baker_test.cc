@@ -59,7 +59,7 @@ void ExpectOneFailure(Throws throws, int levels, const std::string& message) {
   const geo::TileKey tile{levels, deepest.start_x, deepest.start_y};
   std::vector<Target> targets = {{{}, manifests->front()}};
   targets.front().create = [&]() -> Result<std::unique_ptr<archive::UnitWriter>> {
-    if (throws == Throws::kInCreate) throw std::runtime_error("statistics cannot be read");
+    if (throws == Throws::kInCreate) throw ThrownError({ErrorCode::kUnavailable, "statistics cannot be read"});
     return std::make_unique<ThrowingWriter>(throws, tile);
   };
   const tiler::TilePipeline pipeline({std::move(dataset)}, 0);

@@ -158,21 +158,21 @@ class Environment {
   std::vector<std::pair<const char*, std::optional<std::string>>> before_;
 };
 
-TEST(DefaultCacheDir, IsTheFirstThatTheEnvironmentNames) {
+TEST(CacheDirFromEnvironment, IsTheFirstThatTheEnvironmentNames) {
   const Environment environment;
-  EXPECT_EQ(DefaultCacheDir(), "");
+  EXPECT_EQ(CacheDirFromEnvironment(), "");
   ::setenv("HOME", "/users/me", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/users/me/.cache/terrace");
+  EXPECT_EQ(CacheDirFromEnvironment(), "/users/me/.cache/terrace");
   ::setenv("XDG_CACHE_HOME", "/caches", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/caches/terrace");
+  EXPECT_EQ(CacheDirFromEnvironment(), "/caches/terrace");
   ::setenv("XDG_CACHE_HOME", "relative", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/users/me/.cache/terrace") << "as the XDG specification says";
+  EXPECT_EQ(CacheDirFromEnvironment(), "/users/me/.cache/terrace") << "as the XDG specification says";
   ::setenv("CACHE_DIRECTORY", "/var/cache/terrace", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/var/cache/terrace");
+  EXPECT_EQ(CacheDirFromEnvironment(), "/var/cache/terrace");
   ::setenv("CACHE_DIRECTORY", "/var/cache/terrace:/var/cache/other", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/var/cache/terrace");
+  EXPECT_EQ(CacheDirFromEnvironment(), "/var/cache/terrace");
   ::setenv("CACHE_DIRECTORY", "", 1);
-  EXPECT_EQ(DefaultCacheDir(), "/users/me/.cache/terrace");
+  EXPECT_EQ(CacheDirFromEnvironment(), "/users/me/.cache/terrace");
 }
 
 TEST(FromWorkingDirectory, TakesOffWhatAPathGoesUp) {

@@ -89,7 +89,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     await page.locator('#globe canvas').waitFor(kWait);
     assert.ok(await page.locator('#imagery').isVisible());
     assert.ok(await page.locator('#wireframe').isHidden());
-    assert.equal(await page.locator('#attribution').textContent(), 'A & B');
+    assert.equal(await page.locator('#attribution').textContent(), 'A & B · C');
     const pixels = () => page.evaluate(() => {
       const canvas = document.querySelector('#globe canvas');
       return Array.from(new Uint32Array(canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.buffer));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <set>
+#include <string>
 
 namespace terrace::cli {
 namespace {

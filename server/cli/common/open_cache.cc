@@ -24,7 +24,7 @@ dem::RasterCache OpenStatisticsCache(const config::Config& config) {
   if (config.cache_dir.empty() || config.cache_dir_bytes == 0) return none("as the configuration says");
   std::string place = config.cache_dir;
   if (place == config::kDefaultCacheDir) {
-    place = config::DefaultCacheDir();
+    place = config::CacheDirFromEnvironment();
     if (place.empty()) return none("as neither CACHE_DIRECTORY nor XDG_CACHE_HOME nor HOME names a folder");
     std::error_code unknown;
     const bool exists = std::filesystem::is_directory(place, unknown);

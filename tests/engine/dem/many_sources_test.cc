@@ -320,7 +320,6 @@ TEST(ManySources, PagedTablesOfALostFileAreMadeAgain) {
   } catch (const ThrownError& thrown) {
     EXPECT_EQ(thrown.error().code, ErrorCode::kChanged) << thrown.what();
   }
-  EXPECT_FALSE(raster.ReadAverages(64, {0, 0, 1, 1}, {}).has_value());
 }
 
 TEST(ManySources, SourcesOfOneProjectionShareItsOperation) {

@@ -213,7 +213,7 @@ TEST(HeadEnd, RefusesLinesWithoutCr) {
   EXPECT_EQ(FindHeadEnd("\n", 0).error().status, 400);
 }
 
-TEST(FirstLine, IsToldOfWhatIsRefused) {
+TEST(RefusedRequest, HasMethodTargetAndOrigin) {
   const Request head =
       RefusedRequestOf("HEAD /maui/layer.json?token=secret-1&x=1 HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n");
   EXPECT_EQ(head.method, Method::kHead);
