@@ -37,10 +37,10 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
-// returns them unchanged if, in this read, the heights of all sources that the edit touches (with kSource also the
-// floor) have the edit's datum. Otherwise they are converted to the ellipsoid and back, which may change them by
-// millimetres.
+// The vertical datum of heights. An edit states its heights in a datum of its own. If a read in kOrthometric or kSource
+// returns the heights of all sources that the edit touches in that same datum (and, with kSource, the floor too), it
+// returns the edit's heights exactly as stated. Otherwise they are converted to the ellipsoid and back, which may
+// change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid

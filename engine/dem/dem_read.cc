@@ -101,7 +101,7 @@ Result<void> FillNodesOf(const RasterGrid& grid, const geo::NodeGrid& node_grid,
   if (!hole_heights.empty()) copy_back(hole_heights, *nodes.hole_heights);
   if (reading_of_part != nullptr) {
     reading_of_part->part = part;
-    reading->cells = {};  // can be located again
+    reading->cells = {};  // saves memory; Widened computes them again
   }
   return done;
 }

@@ -30,7 +30,7 @@ class ElevationModel {
   // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
   // raster; a raster that may have undeclared voids takes up to four passes. Relative paths are resolved at each use:
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
-  // Paths name files; a program lists the files of a folder itself and sets DemFile::skip_if_no_raster.
+  // Paths name files, not folders. To open a folder, pass its files, each with DemFile::skip_if_no_raster set.
   // Errors name the file, the fault and the remedy. kNotFound: a file does not exist; a raster has no height; or,
   // with skip_if_no_raster, all files were skipped or none has a height. kInvalidArgument: an option, a reference
   // system, a raster or an edit that cannot be used, also if the edit's file or raster cannot be read. kUnavailable: a
@@ -63,7 +63,7 @@ class ElevationModel {
   bool IsAvailable(const geo::TileKey& key) const;
 
   // A range that contains all heights of the tile's samples, without the halo, from the statistics alone. Accepts any
-  // valid key; tiles outside all sources hold only the floor.
+  // valid key; tiles that neither a source nor an edit reaches hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid. Precondition: a valid key.

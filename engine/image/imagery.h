@@ -42,8 +42,9 @@ class Imagery {
   // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // Opens a georeferenced image in 8 or 16 bits per band. Its bands are grey with or without alpha, a palette, bands
-  // that state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path`
+  // Opens a georeferenced image in 8 or 16 bits per band. Its bands are grey with or without alpha; a palette; bands
+  // that state red, green and blue; or 3 or 4 bands that do not state them, of which the first three are taken as red,
+  // green and blue. `around`: the bounds of the dataset (DemInfo::bounds). `path`
   // is resolved at each use. `content`: where hashes of large files are stored, and the token that stops Open.
   // kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference,
   // bands that are not colours, or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it

@@ -115,8 +115,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   }
 
   // Does nothing while a reply is being sent: the body is released by then. While ReceiveBody waits for memory, the
-  // budget may grant it and take it back before has_upload_ is set. So displaced_ is set then too, and ReceiveBody
-  // checks it after the wait.
+  // budget may grant the memory and take it back before ReceiveBody sets has_upload_. Therefore is_receiving_ suffices
+  // to set displaced_, and ReceiveBody checks displaced_ after the wait.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;

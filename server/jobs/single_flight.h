@@ -53,7 +53,7 @@ class SingleFlight {
 
   // Waits for the flight of `key`, or starts one. Each client that joins queues its own `build` with its `terms`, and
   // the first that a worker takes runs: builds of one key must be equivalent. `name` is for messages. An exception of
-  // `build` counts as FailureOf says. kOverloaded: the pool refused or dropped the flight's job. kCancelled: the
+  // `build` counts as FailureOf says. kOverloaded: the pool refused or dropped all jobs of the flight. kCancelled: the
   // deadline passed, the awaiting coroutine was cancelled, or the pool was cancelled before `build` began. Otherwise
   // the result of `build`.
   asio::awaitable<FlightResult> Join(Key key, std::string name, BuildWork build, JobTerms terms);

@@ -16,12 +16,12 @@ using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
 // Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. If an edge passes
 // between neighbouring samples (TileError::is_cut_through), makes the mesh Delaunay and goes on. Returns the
-// measurement of the final mesh. The largest error exceeds the bound only
-// - at vertices whose rounded positions are not those of their samples, if all neighbouring samples are vertices: by
-//   the change of the ground over that offset;
-// - by the format's rounding of heights;
-// - on the edges of tiles and beside them, because `measure` names no samples on edges, which neighbours share;
-// - if the mesh would need more than `max_vertices`.
+// measurement of the final mesh. The largest error exceeds the bound only in these cases:
+// - Rounding moved a vertex away from its sample, and all neighbouring samples are vertices already. The excess is at
+//   most the change of the ground over the distance that the vertex was moved.
+// - The format rounds heights. The excess is at most that.
+// - A sample is on an edge of the tile or beside one: `measure` names no samples on edges, which neighbours share.
+// - The mesh would need more than `max_vertices`.
 // kCancelled: stopped.
 Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
                                            const std::stop_token& stop);
