@@ -14,10 +14,9 @@ namespace terrace::proto {
 struct TileError {
   double max_m = 0;  // over every lattice sample of the tile
   // Samples to insert: for each triangle that exceeds the bound, its worst sample inside the tile that is not a vertex.
-  // If no triangle has such a sample: the neighbours of the vertices that exceed the bound. Such a vertex
-  // exceeds it because rounding moved it along a steep triangle; once its neighbours are vertices, the triangles around
-  // it are no steeper than the ground. Empty if nothing can be
-  // inserted, whatever max_m is.
+  // If no triangle has such a sample: the neighbours of the vertices that exceed the bound. Such a vertex exceeds it
+  // because rounding moved it along a steep triangle; once its neighbours are vertices, the triangles around it are no
+  // steeper than the ground. Empty if nothing can be inserted, whatever max_m is.
   std::vector<tin::SamplePosition> to_insert;
   // Nothing can be inserted, but a vertex exceeds the bound because an edge passes between it and a neighbouring
   // vertex. A Delaunay triangulation has no such edges.

@@ -33,8 +33,8 @@ struct DatasetView : tiler::DatasetExtent {
   std::uint64_t cache_generation = 0;  // the dataset's part of cache keys: Dataset::cache_generation
   // tiler::TileEditsHash. Empty: there are no edits.
   std::function<std::uint64_t(const tiler::TileRequest&)> edits_hash = {};
-  // ElevationModel::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Errors:
-  // those of BakedTiles::RangeBound. Empty: `heights` holds for all tiles.
+  // A range that contains all samples of a tile: ElevationModel::RangeBound, whose ThrownError is returned, or
+  // BakedTiles::RangeBound, with its errors. Thread-safe. Empty: `heights` holds for all tiles.
   std::function<Result<dem::HeightRange>(const geo::TileKey&)> range_bound = {};
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};

@@ -296,7 +296,7 @@ export async function startFlatMap() {
       byId("readout").hidden = true;
       document.title = `${dataset.name} · terrace`;
       if (named() !== dataset.name) history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
-      byId("attribution").textContent = [textOf(dataset.attribution), textOf(dataset.imagery?.attribution)].filter(Boolean).join(" · ");
+      byId("attribution").textContent = textOf(dataset.attribution, dataset.imagery?.attribution);
       byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
       byId("message").hidden = true;

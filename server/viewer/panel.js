@@ -111,7 +111,7 @@ export class Panel {
     document.title = `${name} · terrace`;
     this.heights = heights;
     this.setColouring(byId("colouring").value);
-    byId("attribution").textContent = [textOf(attribution), textOf(imagery?.attribution), "drawn with CesiumJS"].filter(Boolean).join(" · ");
+    byId("attribution").textContent = textOf(attribution, imagery?.attribution, "drawn with CesiumJS");
   }
 
   setColouring(name) {
