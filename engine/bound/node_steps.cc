@@ -15,17 +15,19 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The steps of one axis and a vector of columns.
+// The steps of some columns of nodes. x and y alternate in the lanes.
 template <class D, class V = hn::Vec<D>>
-struct AxisSteps {
-  explicit AxisSteps(D d)
+struct LaneSteps {
+  explicit LaneSteps(D d)
       : east(hn::Zero(d)),
         north(east),
         bend(east),
         least(hn::Set(d, std::numeric_limits<double>::infinity())),
-        most(hn::Neg(least)) {}
+        most(hn::Neg(least)),
+        known(east) {}
 
   V east, north, bend, least, most;
+  V known;  // becomes NaN if a position is
 };
 
 template <class D, class V = hn::Vec<D>>
@@ -33,16 +35,18 @@ HWY_INLINE void Raise(V& largest, V value) {
   largest = hn::Max(largest, hn::Abs(value));
 }
 
-// Measures the nodes of as many columns as the tag has lanes. `known` becomes NaN if a place is.
+// Measures half as many columns of nodes as the tag has lanes. `number`: the first of the southern row. `stride`: in
+// numbers. `is_last`: the eastern steps of these columns lead out of the box.
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE void MeasureColumns(D d, const double* place, std::size_t stride, int rows, AxisSteps<D>& steps, V& known) {
-  V here = hn::LoadU(d, place), south = hn::Sub(here, hn::LoadU(d, place - stride));
-  known = hn::Add(known, south);
-  for (int j = 0; j <= rows; ++j, place += stride) {
-    const V next = hn::LoadU(d, place + stride), north = hn::Sub(next, here);
-    const V east = hn::Sub(hn::LoadU(d, place + 1), here), west = hn::Sub(here, hn::LoadU(d, place - 1));
-    known = hn::Add(known, hn::Add(north, hn::Add(east, west)));
-    Raise<D>(steps.east, east);
+HWY_INLINE void MeasureColumns(D d, const double* number, std::size_t stride, int rows, bool is_last,
+                               LaneSteps<D>& steps) {
+  V here = hn::LoadU(d, number), south = hn::Sub(here, hn::LoadU(d, number - stride)), eastern = hn::Zero(d);
+  steps.known = hn::Add(steps.known, south);
+  for (int j = 0; j <= rows; ++j, number += stride) {
+    const V next = hn::LoadU(d, number + stride), north = hn::Sub(next, here);
+    const V east = hn::Sub(hn::LoadU(d, number + 2), here), west = hn::Sub(here, hn::LoadU(d, number - 2));
+    steps.known = hn::Add(steps.known, hn::Add(north, hn::Add(east, west)));
+    Raise<D>(eastern, east);
     if (j < rows) Raise<D>(steps.north, north);
     Raise<D>(steps.bend, hn::Sub(east, west));
     Raise<D>(steps.bend, hn::Sub(north, south));
@@ -51,50 +55,54 @@ HWY_INLINE void MeasureColumns(D d, const double* place, std::size_t stride, int
     here = next;
     south = north;
   }
+  if (!is_last) steps.east = hn::Max(steps.east, eastern);
 }
 
-// `is_last`: the eastern steps of these columns lead out of the box.
+// Precondition: the box has at least half as many columns of cells as the tag has lanes.
 template <class D>
-HWY_INLINE bool MeasureVector(D d, const NodeCoordinates& places, std::size_t column, int rows, bool is_last,
-                              NodeSteps& steps, PixelBounds& at) {
-  AxisSteps<D> x(d), y(d);
-  auto known = hn::Zero(d);
-  MeasureColumns(d, places.x + column, places.stride, rows, x, known);
-  MeasureColumns(d, places.y + column, places.stride, rows, y, known);
-  if (!hn::AllTrue(d, hn::Eq(known, known))) return false;
-  const auto largest = [&](auto value) HWY_ATTR { return hn::GetLane(hn::MaxOfLanes(d, value)); };
-  const auto least = [&](auto value) HWY_ATTR { return hn::GetLane(hn::MinOfLanes(d, value)); };
-  if (!is_last) {
-    steps.east_x = std::max(steps.east_x, largest(x.east));
-    steps.east_y = std::max(steps.east_y, largest(y.east));
+HWY_INLINE bool MeasureBox(D d, const double* numbers, std::size_t stride, std::size_t columns, int rows,
+                           NodeSteps& steps, PixelBounds& at) {
+  const std::size_t lanes = hn::Lanes(d), end = 2 * columns;
+  LaneSteps<D> of_number[2] = {LaneSteps<D>(d), LaneSteps<D>(d)};  // the second one, of y, only if there is one lane
+  const auto measure = [&](std::size_t i, bool is_last) HWY_ATTR {
+    MeasureColumns(d, numbers + i, stride, rows, is_last, of_number[lanes == 1 ? i % 2 : 0]);
+  };
+  for (std::size_t i = 0; i + lanes <= end; i += lanes) measure(i, false);
+  // Nodes may be measured twice.
+  if (end % lanes != 0) measure(end - lanes, false);
+  for (std::size_t i = end + 2 - std::max<std::size_t>(lanes, 2); i < end + 2; i += lanes) measure(i, true);
+  for (std::size_t first = 0; first < (lanes == 1 ? 2 : 1); ++first) {
+    const LaneSteps<D>& measured = of_number[first];
+    if (!hn::AllTrue(d, hn::Eq(measured.known, measured.known))) return false;
+    double east[8], north[8], bend[8], least[8], most[8];
+    hn::StoreU(measured.east, d, east);
+    hn::StoreU(measured.north, d, north);
+    hn::StoreU(measured.bend, d, bend);
+    hn::StoreU(measured.least, d, least);
+    hn::StoreU(measured.most, d, most);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const bool is_x = (first + lane) % 2 == 0;
+      const auto raise = [&](double& of_x, double& of_y, double value) {
+        double& largest = is_x ? of_x : of_y;
+        largest = std::max(largest, value);
+      };
+      raise(steps.east_x, steps.east_y, east[lane]);
+      raise(steps.north_x, steps.north_y, north[lane]);
+      raise(steps.bend_x, steps.bend_y, bend[lane]);
+      double &low = is_x ? at.west : at.north, &high = is_x ? at.east : at.south;
+      low = std::min(low, least[lane]);
+      high = std::max(high, most[lane]);
+    }
   }
-  steps.north_x = std::max(steps.north_x, largest(x.north));
-  steps.north_y = std::max(steps.north_y, largest(y.north));
-  steps.bend_x = std::max(steps.bend_x, largest(x.bend));
-  steps.bend_y = std::max(steps.bend_y, largest(y.bend));
-  at.Add(least(x.least), least(y.least));
-  at.Add(largest(x.most), largest(y.most));
   return true;
 }
 
-template <class D>
-HWY_INLINE bool MeasureBox(D d, const NodeCoordinates& places, std::size_t columns, int rows, NodeSteps& steps,
-                           PixelBounds& at) {
-  const std::size_t lanes = hn::Lanes(d);
-  for (std::size_t i = 0; i + lanes <= columns; i += lanes) {
-    if (!MeasureVector(d, places, i, rows, false, steps, at)) return false;
-  }
-  // Nodes may be measured twice.
-  if (columns % lanes != 0 && !MeasureVector(d, places, columns - lanes, rows, false, steps, at)) return false;
-  return MeasureVector(d, places, columns + 1 - lanes, rows, true, steps, at);
-}
-
-bool Measure(const NodeCoordinates& places, std::size_t columns, int rows, NodeSteps& steps, PixelBounds& at) {
+bool Measure(const double* numbers, std::size_t stride, std::size_t columns, int rows, NodeSteps& steps,
+             PixelBounds& at) {
   const hn::CappedTag<double, 8> wide;
-  if (columns >= hn::Lanes(wide)) return MeasureBox(wide, places, columns, rows, steps, at);
+  if (2 * columns >= hn::Lanes(wide)) return MeasureBox(wide, numbers, stride, columns, rows, steps, at);
   const hn::CappedTag<double, 2> narrow;
-  if (columns >= hn::Lanes(narrow)) return MeasureBox(narrow, places, columns, rows, steps, at);
-  return MeasureBox(hn::CappedTag<double, 1>(), places, columns, rows, steps, at);
+  return MeasureBox(narrow, numbers, stride, columns, rows, steps, at);
 }
 
 }  // namespace
@@ -110,8 +118,10 @@ HWY_EXPORT(Measure);
 
 }  // namespace
 
-bool MeasureSteps(const NodeCoordinates& places, int columns, int rows, NodeSteps& steps, PixelBounds& at) {
-  return HWY_DYNAMIC_DISPATCH(Measure)(places, static_cast<std::size_t>(columns), rows, steps, at);
+bool MeasureSteps(const Position* southwest, std::size_t stride, int columns, int rows, NodeSteps& steps,
+                  PixelBounds& at) {
+  static_assert(sizeof(Position) == 2 * sizeof(double));
+  return HWY_DYNAMIC_DISPATCH(Measure)(&southwest->x, 2 * stride, static_cast<std::size_t>(columns), rows, steps, at);
 }
 
 }  // namespace terrace::dem

@@ -1,9 +1,10 @@
-// Steps between the places of neighbouring nodes, with SIMD. Results are bit-equal on all instruction sets.
+// Steps between the positions of neighbouring nodes, with SIMD. Results are bit-equal on all instruction sets.
 #pragma once
 
 #include <cstddef>
 
 #include "engine/bound/tile_cells.h"
+#include "engine/crs/projector.h"
 
 namespace terrace::dem {
 
@@ -13,14 +14,10 @@ struct NodeSteps {
   double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
 };
 
-// Places by node, row by row from the south.
-struct NodeCoordinates {
-  const double *x, *y;  // of the south-western node of the box
-  std::size_t stride;
-};
-
-// Measures a box of columns x rows cells and adds its nodes to `at`. Returns false if a node or a neighbour of one has
-// no place (NaN).
-bool MeasureSteps(const NodeCoordinates& places, int columns, int rows, NodeSteps& steps, PixelBounds& at);
+// Measures a box of columns x rows cells and adds its nodes to `at`, in the unit of the positions. `southwest`: the
+// box's south-western node, in rows of `stride` nodes from the south. Returns false if a node or a neighbour of one has
+// no position (NaN).
+bool MeasureSteps(const Position* southwest, std::size_t stride, int columns, int rows, NodeSteps& steps,
+                  PixelBounds& at);
 
 }  // namespace terrace::dem

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/raster/grid_cells.h"
 #include "engine/raster/nan_heights.h"
-#include "engine/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -52,69 +52,51 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
       geoid_(geoid),
       blends_(blends),
       position_error_(MaxPositionError(grid.georeference())),
-      misplacement_{statistics.misplacement().x / reading.factor, statistics.misplacement().y / reading.factor} {
-  PlaceNodes(grid);
+      misplacement_{statistics.misplacement().x / reading.factor, statistics.misplacement().y / reading.factor},
+      is_even_around_(grid.wraps() && grid.columns() % reading.factor == 0) {
+  const auto last = [&](int samples) {
+    const GridAxis axis(samples, reading.factor, false);
+    return static_cast<double>(axis.count() - (samples % reading.factor == 0 ? 1 : 2));
+  };
+  last_ = {last(grid.columns()) - misplacement_.x, last(grid.rows()) - misplacement_.y};
+  if (reading.cells.is_separable()) PlaceColumnsAndRows();
 }
 
-// Nodes that took their height from this raster grid. Averages are not evenly spaced at the end of an axis whose last
-// average covers fewer samples. Beyond the outermost averages, where the surface is constant, all places are those of
-// the averages: the steps between places change there, which counts as a bend.
-void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
-  const GridAxis columns(grid.columns(), reading_.factor, grid.wraps()), rows(grid.rows(), reading_.factor, false);
-  const auto last = [&](const GridAxis& axis, int samples) {
-    return static_cast<double>(axis.count() - (samples % reading_.factor == 0 ? 1 : 2));
-  };
-  const double last_x = last(columns, grid.columns()) - misplacement_.x;
-  const double last_y = last(rows, grid.rows()) - misplacement_.y;
-  const auto of_column = [&](std::int64_t column, double weight) {
-    const double x = static_cast<double>(column) + weight;
-    const bool is_even = (grid.wraps() && grid.columns() % reading_.factor == 0) || (x >= 0 && x <= last_x);
-    return is_even ? x : kUnknown;
-  };
-  const auto of_row = [&](std::int64_t row, double weight) {
-    const double y = static_cast<double>(row) + weight;
-    return y >= 0 && y <= last_y ? y : kUnknown;
-  };
+// Averages are not evenly spaced at the end of an axis whose last average covers fewer samples. Beyond the outermost
+// averages, where the surface is constant, all places are those of the averages: the steps between places change there,
+// which counts as a bend.
+double SmoothErrorBound::EvenColumn(std::int64_t column, double weight) const {
+  const double x = static_cast<double>(column) + weight;
+  return is_even_around_ || (x >= 0 && x <= last_.x) ? x : kUnknown;
+}
+
+double SmoothErrorBound::EvenRow(std::int64_t row, double weight) const {
+  const double y = static_cast<double>(row) + weight;
+  return y >= 0 && y <= last_.y ? y : kUnknown;
+}
+
+void SmoothErrorBound::PlaceColumnsAndRows() {
   const NodeCells& cells = reading_.cells;
   const NodeWindow& part = cells.window();  // nodes beyond have no height from this raster grid
-  const auto west = static_cast<std::size_t>(part.column - tile_.window.column);
-  const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
-  is_separable_ = cells.is_separable();
-  if (is_separable_) {
-    const auto rows_there = static_cast<std::size_t>(tile_.window.rows);
-    x_ = std::make_unique_for_overwrite<double[]>(tile_.stride());
-    y_ = std::make_unique_for_overwrite<double[]>(rows_there);
-    std::fill_n(x_.get(), tile_.stride(), kUnknown);
-    std::fill_n(y_.get(), rows_there, kUnknown);
-    for (std::size_t i = 0; i < cells.columns().size(); ++i) {
-      x_[west + i] = of_column(cells.columns()[i].index, cells.columns()[i].weight);
-    }
-    for (std::size_t j = 0; j < cells.rows().size(); ++j) {
-      y_[south + j] = of_row(cells.rows()[j].index, cells.rows()[j].weight);
-    }
-    return;
+  x_.assign(tile_.stride(), kUnknown);
+  y_.assign(static_cast<std::size_t>(tile_.window.rows), kUnknown);
+  double* const x = x_.data() + (part.column - tile_.window.column);
+  double* const y = y_.data() + (part.row - tile_.window.row);
+  for (std::size_t i = 0; i < cells.columns().size(); ++i) {
+    x[i] = EvenColumn(cells.columns()[i].index, cells.columns()[i].weight);
   }
-  const std::size_t nodes = reading_.heights.size(), columns_here = cells.positions().columns();
-  x_ = std::make_unique_for_overwrite<double[]>(nodes);
-  y_ = std::make_unique_for_overwrite<double[]>(nodes);
-  if (cells.positions().rows() < static_cast<std::size_t>(tile_.window.rows) || columns_here < tile_.stride()) {
-    std::fill_n(x_.get(), nodes, kUnknown);
-    std::fill_n(y_.get(), nodes, kUnknown);
+  for (std::size_t j = 0; j < cells.rows().size(); ++j) {
+    y[j] = EvenRow(cells.rows()[j].index, cells.rows()[j].weight);
   }
-  for (std::size_t j = 0; j < cells.positions().rows(); ++j) {
-    const std::size_t first = (south + j) * tile_.stride() + west;
-    double *const x = x_.get() + first, *const y = y_.get() + first;
-    const float* const heights = reading_.heights.data() + first;
-    const bool are_all_known = GridCoordinatesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
-                                                 {last_x, last_y}, {x, columns_here}, {y, columns_here});
-    for (std::size_t i = 0; !are_all_known && i < columns_here; ++i) {
-      if (std::isnan(heights[i]) || !std::isnan(x[i])) continue;
-      const GridCell cell = cells.At(i, j);
-      x[i] = of_column(cell.column, cell.x);
-      y[i] = of_row(cell.row, cell.y);
-      if (std::isnan(x[i] + y[i])) x[i] = y[i] = kUnknown;
-    }
-  }
+}
+
+// The place of a node of the tile's window, in averages; NaN if it is not regular.
+Position SmoothErrorBound::PlaceOf(std::size_t i, std::size_t j) const {
+  if (std::isnan(reading_.heights[j * tile_.stride() + i])) return kNowhere;
+  if (reading_.cells.is_separable()) return {x_[i], y_[j]};
+  const GridCell cell = reading_.cells.OfNode(tile_.window.column + static_cast<std::int64_t>(i),
+                                              tile_.window.row + static_cast<std::int64_t>(j));
+  return {EvenColumn(cell.column, cell.x), EvenRow(cell.row, cell.y)};
 }
 
 // Returns false if one of the nodes `first` to `end` of a row of the tile's window has no height from this raster grid.
@@ -122,15 +104,25 @@ bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size
   return !HasVoids(std::span(reading_.heights).subspan(row * tile_.stride() + first, end - first));
 }
 
+// The same for the nodes of a box and their neighbours.
+bool SmoothErrorBound::GaveHeights(const CellBox& box) const {
+  if (box.south >= known_south_ && box.north <= known_north_) return true;
+  const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
+  const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
+  if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
+  for (std::size_t j = south; j <= north; ++j) {
+    if (!GaveHeights(j, west - 1, east + 2)) return false;
+  }
+  return true;
+}
+
 PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
   PixelBounds bounds;
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {
-      const std::size_t n = tile_.NodeIndex(i, j);
-      const double x = is_separable_ ? x_[static_cast<std::size_t>(i + 1)] : x_[n];
-      const double y = is_separable_ ? y_[static_cast<std::size_t>(j + 1)] : y_[n];
-      if (std::isnan(x + y) || std::isnan(reading_.heights[n])) return {};
-      bounds.Add(x, y);
+      const Position place = PlaceOf(static_cast<std::size_t>(i + 1), static_cast<std::size_t>(j + 1));
+      if (std::isnan(place.x + place.y)) return {};
+      bounds.Add(place.x, place.y);
     }
   }
   return bounds;
@@ -158,13 +150,8 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
 }
 
 bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
-  if (is_separable_) {
-    if (!MeasureAxes(box, steps, at)) return false;
-  } else {
-    const std::size_t n = tile_.NodeIndex(box.west, box.south);
-    const NodeCoordinates places{x_.get() + n, y_.get() + n, tile_.stride()};
-    if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
-  }
+  if (!GaveHeights(box)) return false;
+  if (!(reading_.cells.is_separable() ? MeasureAxes(box, steps, at) : MeasureNodes(box, steps, at))) return false;
   // A line with second difference b deviates from its chord by b / 8, and half as much again covers changes of b in
   // both directions. At the outermost averages places stop between two nodes: a part a of a step of length s is lost,
   // the steps differ by a or by s - a, and a place is at most a (s - a) / s, half of the larger one, off the chord.
@@ -175,18 +162,44 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
   return true;
 }
 
+bool SmoothErrorBound::MeasureNodes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
+  const int columns = box.east - box.west, rows = box.north - box.south;
+  const NodePositions& positions = reading_.cells.positions();
+  if (!reading_.cells.axes().columns.wraps()) {
+    const auto [column, row] = tile_.GlobalNode(tile_.Cell(box.west, box.south), 0);
+    const auto i = static_cast<std::size_t>(column - positions.window().column);
+    const auto j = static_cast<std::size_t>(row - positions.window().row);
+    NodeSteps pixels;
+    PixelBounds in_pixels;
+    if (!MeasureSteps(&positions.Row(j)[i], positions.columns(), columns, rows, pixels, in_pixels)) return false;
+    // `factor` is a power of two: only the difference is rounded.
+    const double per_factor = 1.0 / reading_.factor;
+    steps = {pixels.east_x * per_factor,  pixels.east_y * per_factor, pixels.north_x * per_factor,
+             pixels.north_y * per_factor, pixels.bend_x * per_factor, pixels.bend_y * per_factor};
+    at = {in_pixels.west * per_factor - 0.5, in_pixels.east * per_factor - 0.5, in_pixels.north * per_factor - 0.5,
+          in_pixels.south * per_factor - 0.5};
+    // The neighbours of the box are one step away, which differs from the steps of the box by no more than the bend.
+    const double reach_x = std::max(steps.east_x, steps.north_x) + steps.bend_x;
+    const double reach_y = std::max(steps.east_y, steps.north_y) + steps.bend_y;
+    const bool are_even = at.west - reach_x >= 0 && at.east + reach_x <= last_.x && at.north - reach_y >= 0 &&
+                          at.south + reach_y <= last_.y;
+    if (are_even) return true;
+  }
+  std::vector<Position> places;
+  const auto stride = static_cast<std::size_t>(columns + 3);
+  for (int j = box.south; j <= box.north + 2; ++j) {
+    for (int i = box.west; i <= box.east + 2; ++i) {
+      places.push_back(PlaceOf(static_cast<std::size_t>(i), static_cast<std::size_t>(j)));
+    }
+  }
+  steps = {}, at = {};
+  return MeasureSteps(&places[stride + 1], stride, columns, rows, steps, at);
+}
+
 // Columns of nodes run along columns of samples, rows along rows: each step has one axis.
 bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
   const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
   const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
-  // A node's neighbours count as well.
-  const bool are_known = box.south >= known_south_ && box.north <= known_north_;
-  if (!are_known) {
-    if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
-    for (std::size_t j = south; j <= north; ++j) {
-      if (!GaveHeights(j, west - 1, east + 2)) return false;
-    }
-  }
   double finite = 0;  // becomes NaN if a place is
   const auto measure = [&](const double* places, std::size_t first, std::size_t last, double& step, double& bend) {
     for (std::size_t k = first; k <= last; ++k) {
@@ -196,8 +209,8 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBo
       bend = std::max(bend, std::abs(after - before));
     }
   };
-  measure(x_.get(), west, east, steps.east_x, steps.bend_x);
-  measure(y_.get(), south, north, steps.north_y, steps.bend_y);
+  measure(x_.data(), west, east, steps.east_x, steps.bend_x);
+  measure(y_.data(), south, north, steps.north_y, steps.bend_y);
   for (std::size_t i = west; i <= east; ++i) at.Add(x_[i], y_[south]);
   for (std::size_t j = south; j <= north; ++j) at.Add(x_[west], y_[j]);
   return std::isfinite(finite);
@@ -257,12 +270,12 @@ void SmoothErrorBound::MeasureColumns(const SampleBox& range, ColumnDifferences&
 // All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
 void SmoothErrorBound::PrepareRows(int south, int north) {
   band_.top = 0, band_.bottom = -1;
-  if (!is_separable_ || reading_.samples.empty()) return;
   const auto rows = static_cast<std::size_t>(north - south + 3);
   const auto nodes = std::span(reading_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
   const bool are_known = !HasVoids(nodes.first(rows * tile_.stride()));
   known_south_ = are_known ? south : 0;
   known_north_ = are_known ? north : -1;
+  if (!reading_.cells.is_separable() || reading_.samples.empty()) return;
   const double y0 = y_[static_cast<std::size_t>(south + 1)], y1 = y_[static_cast<std::size_t>(north + 1)];
   if (std::isnan(y0 + y1)) return;
   PixelBounds at;

@@ -5,7 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <vector>
 
 #include "engine/bound/column_differences.h"
 #include "engine/bound/geoid_error_bound.h"
@@ -37,8 +37,13 @@ class SmoothErrorBound {
   struct Differences {
     double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   };
-  void PlaceNodes(const RasterGrid& grid);
+  double EvenColumn(std::int64_t column, double weight) const;
+  double EvenRow(std::int64_t row, double weight) const;
+  void PlaceColumnsAndRows();
+  Position PlaceOf(std::size_t i, std::size_t j) const;
   bool GaveHeights(std::size_t row, std::size_t first, std::size_t end) const;
+  bool GaveHeights(const CellBox& box) const;
+  bool MeasureNodes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   bool MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   // Returns false if a node or a neighbour of one is not regular.
   bool Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
@@ -57,9 +62,9 @@ class SmoothErrorBound {
   const bool blends_;
   const double position_error_;  // in averages
   const Position misplacement_;  // of samples, in averages
-  // In averages; NaN if not regular: per column and per row of the tile's window if separable, else per node.
-  std::unique_ptr<double[]> x_, y_;
-  bool is_separable_ = false;
+  const bool is_even_around_;    // averages are evenly spaced around the Earth
+  Position last_;                // the last place of each axis where averages are evenly spaced
+  std::vector<double> x_, y_;    // if separable, the places of the tile's columns and rows; NaN if not regular
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
   // By column of the reading's window, over rows `top` to `bottom` of the averages.

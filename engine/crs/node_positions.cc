@@ -21,9 +21,9 @@ struct Cell {
 // never cross the antimeridian or a pole.
 int LargestCell(std::int64_t rows) { return static_cast<int>(std::min<std::int64_t>(rows & -rows, kMaxCell)); }
 
-// Cells are interpolated from kKnots x kKnots positions, the outermost on their edges.
-constexpr int kKnots = 5;
-constexpr int kMinCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
+// Cells are interpolated from kKnots x kKnots positions, the outermost on their edges. Smaller cells than these have
+// hardly more nodes.
+constexpr int kMinCell = 2 * (kKnots - 1);
 
 // Lagrange weights of the knots at `step` nodes from a cell's edge.
 std::array<double, kKnots> Weights(double step, int size) {
@@ -39,15 +39,21 @@ std::array<double, kKnots> Weights(double step, int size) {
   return weights;
 }
 
-using CellWeights = std::array<std::array<double, kKnots>, kMaxCell>;
+// By knot and step.
+using CellWeights = std::array<std::array<double, kMaxCell>, kKnots>;
 
-// By step, for cells of this size: each size is computed once.
+// For cells of this size: each size is computed once.
 const CellWeights& WeightsOf(int size) {
   static const auto all = [] {
     std::array<CellWeights, std::bit_width(unsigned{kMaxCell / kMinCell})> weights{};
     for (std::size_t i = 0; i < weights.size(); ++i) {
       const int cell = kMinCell << i;
-      for (int step = 0; step < cell; ++step) weights[i][static_cast<std::size_t>(step)] = Weights(step, cell);
+      for (int step = 0; step < cell; ++step) {
+        const std::array<double, kKnots> of_step = Weights(step, cell);
+        for (std::size_t knot = 0; knot < of_step.size(); ++knot) {
+          weights[i][knot][static_cast<std::size_t>(step)] = of_step[knot];
+        }
+      }
     }
     return weights;
   }();
@@ -191,37 +197,34 @@ class GridNodes {
     for (std::size_t i = 0; i < asked; ++i) *asked_for[i] = fresh[i];
     for (std::size_t i = 0; i < kAll; ++i) known[i] = *place_of[i];
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
-    // Interpolates the knots' columns at one row, then any node of that row.
+    // Interpolates the knots' columns at one row, then nodes of that row.
     const CellWeights& weights = WeightsOf(cell.size);
     const auto row_at = [&](std::int64_t row) {
-      const std::array<double, kKnots>& y = weights[static_cast<std::size_t>(row - cell.row)];
+      const auto step = static_cast<std::size_t>(row - cell.row);
       std::array<Position, kKnots> sums;
-      for (std::size_t i = 0; i < kKnots; ++i) {
-        for (std::size_t j = 0; j < kKnots; ++j) {
-          sums[i].x += y[j] * known[kKnots * j + i].x;
-          sums[i].y += y[j] * known[kKnots * j + i].y;
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        for (std::size_t j = 0; j < weights.size(); ++j) {
+          sums[i].x += weights[j][step] * known[kKnots * j + i].x;
+          sums[i].y += weights[j][step] * known[kKnots * j + i].y;
         }
       }
       return sums;
     };
-    const auto at = [](const std::array<Position, kKnots>& sums, const std::array<double, kKnots>& x) {
-      Position sum;
-      for (std::size_t i = 0; i < kKnots; ++i) {
-        sum.x += x[i] * sums[i].x;
-        sum.y += x[i] * sums[i].y;
-      }
-      return sum;
+    const auto weights_from = [&](std::int64_t step) {
+      std::array<const double*, kKnots> from;
+      for (std::size_t i = 0; i < from.size(); ++i) from[i] = weights[i].data() + step;
+      return from;
     };
     for (std::size_t i = 0; i < kTried; ++i) {
-      const Position tried_at = at(row_at(cell.row + tried[i][1]), weights[static_cast<std::size_t>(tried[i][0])]);
+      Position tried_at;
+      InterpolatePositions(row_at(cell.row + tried[i][1]), weights_from(tried[i][0]), {&tried_at, 1});
       const Position& exact = known[kKnots * kKnots + i];
       if (!(std::abs(tried_at.x - exact.x) <= tolerance_ && std::abs(tried_at.y - exact.y) <= tolerance_)) return false;
     }
+    const std::array<const double*, kKnots> of_columns = weights_from(part.west - cell.column);
+    const auto columns = static_cast<std::size_t>(part.east - part.west);
     for (std::int64_t row = part.south; row < part.north; ++row) {
-      const auto sums = row_at(row);
-      for (std::int64_t column = part.west; column < part.east; ++column) {
-        *At(column, row) = at(sums, weights[static_cast<std::size_t>(column - cell.column)]);
-      }
+      InterpolatePositions(row_at(row), of_columns, {At(part.west, row), columns});
     }
     return true;
   }

@@ -11,6 +11,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/crs/footprint.h"
 #include "engine/crs/georeference.h"
+#include "engine/crs/position_rows.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/node_grid.h"
 #include "engine/geo/tile_key.h"
@@ -39,7 +40,8 @@ class NodePositions {
   // `x` by column, `y` by row.
   NodePositions(const NodeWindow& window, std::vector<double> x, std::vector<double> y)
       : window_(window), x_(std::move(x)), y_(std::move(y)) {}
-  NodePositions(const NodeWindow& window, std::vector<Position> nodes) : window_(window), nodes_(std::move(nodes)) {}
+  NodePositions(const NodeWindow& window, std::vector<Position> nodes)
+      : window_(window), nodes_(std::move(nodes)), extent_(ExtentOf(nodes_)) {}
   // Positions of lattice nodes. NaN where the source's CRS has no position, and outside `footprint`. The nodes of a
   // pole row share one position unless columns are meridians.
   static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::NodeGrid& grid,
@@ -55,8 +57,9 @@ class NodePositions {
   // One per column and one per row, never NaN. Precondition: is_separable().
   std::span<const double> x() const { return x_; }
   std::span<const double> y() const { return y_; }
-  // One per node. Precondition: !is_separable().
+  // One per node, rows of them, and the extent of all. Precondition: !is_separable().
   std::span<const Position> nodes() const { return nodes_; }
+  const PositionExtent& extent() const { return extent_; }
   std::span<const Position> Row(std::size_t j) const { return nodes().subspan(j * columns(), columns()); }
 
   Position At(std::size_t i, std::size_t j) const {
@@ -73,6 +76,7 @@ class NodePositions {
   NodeWindow window_;
   std::vector<double> x_, y_;
   std::vector<Position> nodes_;
+  PositionExtent extent_;  // of nodes_
 };
 
 // Returns the pixel positions of the centres of the tile's lattice cells, without a halo: an image of the tile is

@@ -7,7 +7,6 @@
 
 #include "engine/geo/tile_cover.h"
 #include "engine/mosaic/window_values.h"
-#include "engine/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -74,7 +73,7 @@ void GridCover::RemoveUncovered(int factor, std::int64_t blocks_of_turn, const G
 }
 
 std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) const {
-  return positions.is_separable() ? InsideOfAxes(positions) : Inside(positions.nodes());
+  return positions.is_separable() ? InsideOfAxes(positions) : Inside(positions.nodes(), positions.extent());
 }
 
 // A box contains one rectangle of nodes, or two if the columns jump by one turn.
@@ -112,10 +111,13 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
 }
 
 std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions) const {
+  return Inside(positions, ExtentOf(positions));
+}
+
+std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions, const PositionExtent& known) const {
   // Up to this number, boxes are checked one by one; for more, the index is used.
   constexpr std::size_t kFewBoxes = 8;
   std::vector<std::uint8_t> inside(positions.size());
-  const PositionExtent known = ExtentOf(positions);
   const Box extent{known.min.x, known.min.y, known.max.x, known.max.y};
   if (extent.min_x > extent.max_x) return inside;
   const std::vector<std::size_t> near = index_.Find(Grown(extent, 2 * kEdgeTolerance));

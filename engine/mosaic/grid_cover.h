@@ -39,6 +39,7 @@ class GridCover {
                        std::vector<float>& heights) const;
 
  private:
+  std::vector<std::uint8_t> Inside(std::span<const Position> positions, const PositionExtent& known) const;
   std::vector<std::uint8_t> InsideOfAxes(const NodePositions& positions) const;
 
   std::vector<PixelRange> boxes_;  // without overlap

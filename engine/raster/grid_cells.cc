@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "engine/raster/node_rows.h"
-
 namespace terrace::dem {
 namespace {
 
@@ -41,6 +39,27 @@ class CellWindow {
   std::int64_t west_ = std::numeric_limits<std::int64_t>::max(), east_ = std::numeric_limits<std::int64_t>::min();
   std::int64_t north_ = west_, south_ = east_;
 };
+
+PositionExtent ExtentOfWanted(const NodePositions& positions, std::span<const std::uint8_t> wanted) {
+  PositionExtent extent;
+  const auto add = [&](const Position& min, const Position& max) {
+    extent.min = {std::min(extent.min.x, min.x), std::min(extent.min.y, min.y)};
+    extent.max = {std::max(extent.max.x, max.x), std::max(extent.max.y, max.y)};
+  };
+  for (std::size_t j = 0; j < positions.rows(); ++j) {
+    const std::span<const Position> nodes = positions.Row(j);
+    const std::span<const std::uint8_t> row = wanted.subspan(j * nodes.size(), nodes.size());
+    if (std::ranges::find(row, std::uint8_t{0}) == row.end()) {
+      const PositionExtent of_row = ExtentOf(nodes);
+      add(of_row.min, of_row.max);
+      continue;
+    }
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (row[i] != 0) add(nodes[i], nodes[i]);
+    }
+  }
+  return extent;
+}
 
 }  // namespace
 
@@ -77,34 +96,18 @@ void NodeCells::MoveNear(std::int64_t column) {
 }
 
 // Indices grow with positions, so without wrapping the outermost positions have the outermost cells.
-GridWindow NodeCells::WindowOfNodes(std::span<const std::uint8_t> wanted) const {
+GridWindow NodeCells::WindowOfNodes(std::span<const std::uint8_t> wanted, bool are_all) const {
   CellWindow window;
-  const std::span<const Position> nodes = positions_.nodes();
   if (!axes_.columns.wraps()) {
-    PositionExtent all;
-    const auto add = [&](const Position& min, const Position& max) {
-      all.min = {std::min(all.min.x, min.x), std::min(all.min.y, min.y)};
-      all.max = {std::max(all.max.x, max.x), std::max(all.max.y, max.y)};
-    };
-    for (std::size_t first = 0; first < nodes.size(); first += positions_.columns()) {
-      const std::span<const std::uint8_t> row = wanted.subspan(first, positions_.columns());
-      if (std::ranges::find(row, std::uint8_t{0}) == row.end()) {
-        const PositionExtent of_row = ExtentOf(nodes.subspan(first, row.size()));
-        add(of_row.min, of_row.max);
-        continue;
-      }
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        if (row[i] != 0) add(nodes[first + i], nodes[first + i]);
-      }
-    }
-    for (const Position& position : {all.min, all.max}) {
+    const PositionExtent extent = are_all ? positions_.extent() : ExtentOfWanted(positions_, wanted);
+    for (const Position& position : {extent.min, extent.max}) {
       const GridCell cell = axes_.CellAt(position);
       window.AddColumn(cell.column);
       window.AddRow(cell.row);
     }
     return window.Window(axes_);
   }
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
+  for (std::size_t n = 0; n < wanted.size(); ++n) {
     if (wanted[n] == 0) continue;
     const GridCell cell = At(n % positions_.columns(), n / positions_.columns());
     window.AddColumn(cell.column);
@@ -124,7 +127,7 @@ GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted, bool 
     }
     MoveNear(is_separable() ? columns_[stride / 2].index : At(nearest % stride, nearest / stride).column);
   }
-  if (!is_separable()) return WindowOfNodes(wanted);
+  if (!is_separable()) return WindowOfNodes(wanted, are_all);
   CellWindow window;
   std::vector<std::uint8_t> of_column(stride, are_all ? 1 : 0);
   for (std::size_t j = 0; j < rows_.size(); ++j) {

@@ -72,7 +72,7 @@ class NodeCells {
   void MoveNear(std::int64_t column);
 
  private:
-  GridWindow WindowOfNodes(std::span<const std::uint8_t> wanted) const;
+  GridWindow WindowOfNodes(std::span<const std::uint8_t> wanted, bool are_all) const;
 
   NodePositions positions_;
   GridAxes axes_;

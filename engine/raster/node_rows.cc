@@ -125,64 +125,6 @@ void Round(const double* heights, const double* added, std::size_t count, float*
   });
 }
 
-bool Places(const Position* nodes, std::size_t count, const GridAxes& axes, const float* heights, Position limit,
-            double* to_x, double* to_y) {
-  bool are_all_known = true;
-  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
-    using V = hn::Vec<decltype(d)>;
-    V x, y;
-    LoadPositions(d, nodes + i, x, y);
-    const auto column = Locate(d, x, axes.columns, axes.width), row = Locate(d, y, axes.rows, axes.height);
-    x = hn::Add(column.index, column.weight);
-    y = hn::Add(row.index, row.weight);
-    const V zero = hn::Zero(d), unknown = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
-    const V height = hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, decltype(d)>(), heights + i));
-    const auto is_between = [&](V place, double most)
-                                HWY_ATTR { return hn::And(hn::Gt(place, zero), hn::Lt(place, hn::Set(d, most))); };
-    const auto has_height = hn::Eq(height, height);
-    const auto is_known = hn::And(hn::And(column.is_known, row.is_known),
-                                  hn::And(has_height, hn::And(is_between(x, limit.x), is_between(y, limit.y))));
-    hn::StoreU(hn::IfThenElse(is_known, x, unknown), d, to_x + i);
-    hn::StoreU(hn::IfThenElse(is_known, y, unknown), d, to_y + i);
-    are_all_known &= hn::AllFalse(d, hn::AndNot(is_known, has_height));
-  });
-  return are_all_known;
-}
-
-// Coordinates in turn, x and y, in the lanes of one vector.
-PositionExtent Extent(const Position* positions, std::size_t count) {
-  const hn::CappedTag<double, 8> d;
-  const std::size_t lanes = hn::Lanes(d), numbers = 2 * count;
-  const double* const number = &positions->x;
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  auto least = hn::Set(d, kFar), most = hn::Neg(least), sum = hn::Zero(d);
-  std::size_t i = 0;
-  for (; lanes > 1 && i + lanes <= numbers; i += lanes) {
-    const auto here = hn::LoadU(d, number + i);
-    const auto is_known = hn::Eq(here, here);
-    least = hn::Min(least, hn::IfThenElse(is_known, here, least));
-    most = hn::Max(most, hn::IfThenElse(is_known, here, most));
-    sum = hn::Add(sum, here);  // NaN if one is
-  }
-  PositionExtent extent;
-  extent.are_all_known = hn::AllTrue(d, hn::Eq(sum, sum));
-  const auto add = [&](const double* low, const double* high) {
-    if (low[0] < extent.min.x) extent.min.x = low[0];
-    if (low[1] < extent.min.y) extent.min.y = low[1];
-    if (high[0] > extent.max.x) extent.max.x = high[0];
-    if (high[1] > extent.max.y) extent.max.y = high[1];
-  };
-  double low[8], high[8];
-  hn::StoreU(least, d, low);
-  hn::StoreU(most, d, high);
-  for (std::size_t lane = 0; lane + 1 < lanes; lane += 2) add(low + lane, high + lane);
-  for (; i < numbers; i += 2) {
-    add(number + i, number + i);
-    extent.are_all_known &= number[i] == number[i] && number[i + 1] == number[i + 1];
-  }
-  return extent;
-}
-
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace terrace::dem
@@ -196,8 +138,6 @@ HWY_EXPORT(InterpolateNodes);
 HWY_EXPORT(InterpolateLine);
 HWY_EXPORT(InterpolateLines);
 HWY_EXPORT(Round);
-HWY_EXPORT(Places);
-HWY_EXPORT(Extent);
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -249,20 +189,6 @@ std::span<const double> NodeRows::Row(std::size_t j) {
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded) {
   HWY_DYNAMIC_DISPATCH(Round)
   (heights.data(), added.empty() ? nullptr : added.data(), heights.size(), rounded.data());
-}
-
-bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
-                       Position limit, std::span<double> x, std::span<double> y) {
-  if (axes.columns.wraps()) {
-    std::ranges::fill(x, kUnknown);
-    std::ranges::fill(y, kUnknown);
-    return false;
-  }
-  return HWY_DYNAMIC_DISPATCH(Places)(nodes.data(), nodes.size(), axes, heights.data(), limit, x.data(), y.data());
-}
-
-PositionExtent ExtentOf(std::span<const Position> positions) {
-  return positions.empty() ? PositionExtent{} : HWY_DYNAMIC_DISPATCH(Extent)(positions.data(), positions.size());
 }
 
 }  // namespace terrace::dem

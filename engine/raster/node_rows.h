@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -46,19 +45,5 @@ class NodeRows {
 // RoundHeight of each height plus what is added to it. `added`: one per height, or empty. Precondition: `rounded` has
 // one entry per height.
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
-
-// The places of nodes, in samples: column + x and row + y of GridAxes::CellAt. NaN if the node's height is
-// NaN. Returns false if another node got NaN, because a place is not between 0 and `limit` or is near the end of an
-// axis, or because columns wrap: use CellAt for it. Precondition: all spans have one entry per node.
-bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
-                       Position limit, std::span<double> x, std::span<double> y);
-
-// The outermost coordinates of positions that are known; infinite, with `min` above `max`, if there is none.
-struct PositionExtent {
-  Position min{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-  Position max{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  bool are_all_known = true;
-};
-PositionExtent ExtentOf(std::span<const Position> positions);
 
 }  // namespace terrace::dem

@@ -233,41 +233,6 @@ TEST(NodeRows, VoidsAreCountedReplacedAndWantedWhereNodesAreInside) {
   });
 }
 
-TEST(NodeRows, PlacesAreThoseOfCells) {
-  tin::ForEachInstructionSet([] {
-    int known = 0, asked = 0;
-    for (unsigned seed = 0; seed < 2000; ++seed) {
-      SCOPED_TRACE(seed);
-      Case one(seed);
-      const NodePositions positions = one.ByNodes();
-      const auto columns = positions.columns();
-      const std::vector<float> heights = one.Samples({0, 0, one.nodes().columns, one.nodes().rows});
-      const GridAxes axes = one.axes();
-      const Position limit{static_cast<double>(axes.columns.count() - 1), static_cast<double>(axes.rows.count() - 1)};
-      std::vector<double> x(columns), y(columns);
-      for (std::size_t j = 0; j < positions.rows(); ++j) {
-        const auto of_row = std::span(heights).subspan(j * columns, columns);
-        const bool are_all_known = GridCoordinatesOf(positions.Row(j), axes, of_row, limit, x, y);
-        bool is_one_left = false;
-        for (std::size_t i = 0; i < columns; ++i) {
-          ASSERT_EQ(std::isnan(x[i]), std::isnan(y[i]));
-          is_one_left |= std::isnan(x[i]) && !std::isnan(of_row[i]);
-          if (std::isnan(x[i])) continue;
-          ASSERT_FALSE(std::isnan(of_row[i]));
-          const GridCell cell = axes.CellAt(positions.At(i, j));
-          ASSERT_EQ(x[i], static_cast<double>(cell.column) + cell.x);
-          ASSERT_EQ(y[i], static_cast<double>(cell.row) + cell.y);
-          ++known;
-        }
-        ASSERT_EQ(is_one_left || axes.columns.wraps(), !are_all_known);
-        asked += is_one_left ? 1 : 0;
-      }
-    }
-    EXPECT_GT(known, 50'000);
-    EXPECT_GT(asked, 1'000);
-  });
-}
-
 TEST(NodeRows, ExtentLeavesUnknownPositionsOut) {
   tin::ForEachInstructionSet([] {
     std::mt19937 random(9);

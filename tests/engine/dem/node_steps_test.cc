@@ -1,15 +1,15 @@
-// Steps between places are measured in vectors; what comes out is what each node gives on its own.
+// Steps between positions are measured in vectors; what comes out is what each node gives on its own.
 #include "engine/bound/node_steps.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <tuple>
 #include <vector>
 
+#include "engine/crs/node_positions.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {
@@ -27,15 +27,15 @@ struct Measured {
 };
 
 // Node by node.
-Measured Expected(const NodeCoordinates& places, int columns, int rows) {
+Measured Expected(const Position* southwest, std::ptrdiff_t stride, int columns, int rows) {
   Measured one;
   double sum = 0;
-  const auto axis = [&](const double* place, double& east, double& north, double& bend) {
-    const auto stride = static_cast<std::ptrdiff_t>(places.stride);
+  const auto axis = [&](double Position::*of, double& east, double& north, double& bend) {
     for (int j = 0; j <= rows; ++j) {
       for (int i = 0; i <= columns; ++i) {
-        const double* const p = place + j * stride + i;
-        const double to_east = p[1] - *p, to_west = *p - p[-1], to_north = p[stride] - *p, to_south = *p - p[-stride];
+        const Position* const p = southwest + j * stride + i;
+        const double here = p->*of, to_east = p[1].*of - here, to_west = here - p[-1].*of;
+        const double to_north = p[stride].*of - here, to_south = here - p[-stride].*of;
         sum += to_east + to_west + to_north + to_south;
         if (i < columns) east = std::max(east, std::abs(to_east));
         if (j < rows) north = std::max(north, std::abs(to_north));
@@ -43,13 +43,10 @@ Measured Expected(const NodeCoordinates& places, int columns, int rows) {
       }
     }
   };
-  axis(places.x, one.steps.east_x, one.steps.north_x, one.steps.bend_x);
-  axis(places.y, one.steps.east_y, one.steps.north_y, one.steps.bend_y);
+  axis(&Position::x, one.steps.east_x, one.steps.north_x, one.steps.bend_x);
+  axis(&Position::y, one.steps.east_y, one.steps.north_y, one.steps.bend_y);
   for (int j = 0; j <= rows; ++j) {
-    for (int i = 0; i <= columns; ++i) {
-      const std::size_t n = static_cast<std::size_t>(j) * places.stride + static_cast<std::size_t>(i);
-      one.at.Add(places.x[n], places.y[n]);
-    }
+    for (int i = 0; i <= columns; ++i) one.at.Add(southwest[j * stride + i].x, southwest[j * stride + i].y);
   }
   one.is_known = std::isfinite(sum);
   return one;
@@ -61,24 +58,20 @@ TEST(NodeSteps, AreThoseOfSingleNodes) {
   std::uniform_real_distribution<double> off(-0.2, 0.2);
   int known = 0, unknown = 0;
   for (int round = 0; round < 400; ++round) {
-    std::vector<double> x(kStride * kStride), y(x.size());
-    for (std::size_t n = 0; n < x.size(); ++n) {
-      x[n] = 100 + 0.8 * static_cast<double>(n % kStride) + off(random);
-      y[n] = 300 - 0.7 * static_cast<double>(n / kStride) + off(random);
+    std::vector<Position> nodes(kStride * kStride);
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      nodes[n] = {100 + 0.8 * static_cast<double>(n % kStride) + off(random),
+                  300 - 0.7 * static_cast<double>(n / kStride) + off(random)};
     }
     const auto pick = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };
-    if (round % 2 == 0) {
-      const std::size_t n = random() % x.size();
-      x[n] = y[n] = std::numeric_limits<double>::quiet_NaN();
-    }
+    if (round % 2 == 0) nodes[random() % nodes.size()] = kNowhere;
     const int columns = 1 + pick(16), rows = 1 + pick(16);
     const std::size_t first = kStride * (1 + random() % 3) + 1 + random() % 3;
-    const NodeCoordinates places{x.data() + first, y.data() + first, kStride};
-    const Measured expected = Expected(places, columns, rows);
+    const Measured expected = Expected(&nodes[first], kStride, columns, rows);
     (expected.is_known ? known : unknown) += 1;
     tin::ForEachInstructionSet([&] {
       Measured one;
-      one.is_known = MeasureSteps(places, columns, rows, one.steps, one.at);
+      one.is_known = MeasureSteps(&nodes[first], kStride, columns, rows, one.steps, one.at);
       ASSERT_EQ(one.is_known, expected.is_known) << round;
       if (one.is_known) {
         ASSERT_EQ(one.Values(), expected.Values()) << round;
