@@ -112,7 +112,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {.key = "feather",
        .value = "METRES",
        .help = "Distance from edges and voids over which a source blends into the sources below; 0 is a hard edge",
-       .details = "At most 256 samples of the source. [More](#mosaics)",
+       .details = "At most 256 samples of the source, or of the averages that a level is read from. [More](#mosaics)",
        .codec = Number(&DatasetConfig::feather, 0, 1'000'000),
        .other_words = "blend blending"},
       {.key = "criterion",

@@ -37,9 +37,9 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. An edit states its heights in a datum of its own. If a read in kOrthometric or kSource
-// returns the heights of all sources that the edit touches in that same datum (and, with kSource, the floor too), it
-// returns the edit's heights exactly as stated. Otherwise they are converted to the ellipsoid and back, which may
+// The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
+// returns them exactly as stated if it returns the heights of all sources that the edit touches in the edit's datum;
+// with kSource, the floor's height too. Otherwise it converts the edit's heights to the ellipsoid and back, which may
 // change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
@@ -73,8 +73,8 @@ struct DemOptions {
   int max_void_gap = 64;
   RasterCache cache = {};
   std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
-  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, and at most 256 samples, a source is
-  // blended with the sources below. 0: hard edges.
+  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, a source is blended with the sources
+  // below. At most 256 of the samples, or averages of samples, that the level is read from. 0: hard edges.
   double feather = 0;
   // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
   // equal shares. The share falls if a raster has to be read again. May be empty.
@@ -89,7 +89,8 @@ struct DemOptions {
 struct DemFile {
   std::string path;
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
-  // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
+  // 2^(1/16)), then the path that sorts first. Files of one rank that touch on one pixel grid are one source, with the
+  // path of its first file. The order of the files has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;

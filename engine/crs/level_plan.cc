@@ -104,8 +104,9 @@ int AveragingFactor(double samples_per_cell) {
 }
 
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level) {
-  // Nodes fall between samples and cut their peaks. Above these levels a finer level follows, which cuts less. Two
-  // levels, because sources whose spacings differ by less than a factor of two end at most a level apart.
+  // Nodes fall between samples and cut their peaks, the less the finer the lattice. The deepest levels have a finer
+  // one, because no further level follows. There are two of them, because sources whose spacings differ by less than a
+  // factor of two end at most a level apart.
   constexpr int kDeepest = 2, kNodesThere = 2;
   std::vector<geo::Lattice> lattices;
   for (int level = 0; level <= geo::kMaxLevel; ++level) {

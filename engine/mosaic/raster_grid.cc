@@ -296,7 +296,7 @@ std::optional<float> RasterGrid::PoleHeight(int pole, HeightDatum datum) const {
 }
 
 double RasterGrid::Feather(int factor) const {
-  // On the coarser axis: limits the samples read around a tile, and the time for weights.
+  // Counted on the finer axis. Limits the samples read around a tile, and the time for weights.
   constexpr int kMaxSamples = 256;
   return std::min(options_.feather_m, kMaxSamples * factor * std::min(spacing_.east, spacing_.north));
 }

@@ -2,7 +2,8 @@
 //
 // The path is resolved at each use. A program passes the folder to models as RasterCache::folder, and calls Trim after
 // it has opened them. The folder is created when the first file is written. If that fails, models open nevertheless,
-// and problem() has the reason. Except path(), all other functions are for terrace's own code.
+// and problem() has the reason. Programs use the constructor, path(), Trim() and problem(); all other functions are for
+// terrace's own code.
 //
 // Several processes may share it. Before a file grows, files that this process does not use are removed, the least
 // recently used first, until an eighth of the budget is free. Files in use may fill the whole budget. Loading a file

@@ -233,32 +233,6 @@ TEST(NodeRows, VoidsAreCountedReplacedAndWantedWhereNodesAreInside) {
   });
 }
 
-TEST(NodeRows, ExtentLeavesUnknownPositionsOut) {
-  tin::ForEachInstructionSet([] {
-    std::mt19937 random(9);
-    std::uniform_real_distribution<double> place(-50, 2000);
-    for (std::size_t count = 1; count < 40; ++count) {
-      for (const unsigned share : {0U, 4U, 1U}) {  // one in so many is unknown; 0: none
-        std::vector<Position> positions(count);
-        PositionExtent expected;
-        for (Position& p : positions) {
-          p = {place(random), place(random)};
-          if (share != 0 && random() % share == 0) {
-            p = kNowhere;
-            expected.are_all_known = false;
-            continue;
-          }
-          expected.min = {std::min(expected.min.x, p.x), std::min(expected.min.y, p.y)};
-          expected.max = {std::max(expected.max.x, p.x), std::max(expected.max.y, p.y)};
-        }
-        const PositionExtent extent = ExtentOf(positions);
-        ASSERT_EQ(std::tuple(extent.min.x, extent.min.y, extent.max.x, extent.max.y, extent.are_all_known),
-                  std::tuple(expected.min.x, expected.min.y, expected.max.x, expected.max.y, expected.are_all_known));
-      }
-    }
-  });
-}
-
 // Between four samples the surface is bilinear. Beside voids it is the weighted mean of the valid samples.
 TEST(Interpolate, IsBilinearAndLeavesVoidsOut) {
   const GridWindow window{10, 20, 2, 2};
