@@ -41,7 +41,7 @@ struct ImageryOptions {
 // A file that a dataset was opened from, and its stamp from before it was opened.
 struct WatchedFile {
   std::string path;
-  std::optional<dem::FileStamp> stamp;  // nullopt: there was none
+  std::optional<dem::FileStamp> stamp;  // nullopt: there was no regular file
 };
 
 // One served dataset. Copies share the model, water and imagery, which are immutable: a reload keeps a dataset that
@@ -51,8 +51,8 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
-  // Of GLB tiles. `compression` is a default for requests, as ImageryOptions::texture. TilePipeline sets the
-  // copyright, the texture, `draco.uv` and both errors itself.
+  // Of GLB tiles. `compression` is the default for TileRequest::compression, which bakes and the server use, and for
+  // DrawnSurface::compression. TilePipeline sets the copyright, the texture, `draco.uv` and both errors itself.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
   // An archive of tiles of this dataset, with the same generation if there are sources; null: none.

@@ -29,9 +29,9 @@ class RefinementCache;
 //
 // Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. A refinement is the
 // record of a run of insertions. If a kept tile is requested in another format or coding, or with a larger error, its
-// refinement is replayed without new insertions, and the tile is encoded. If it is requested with a smaller error, the
-// insertion is continued. Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes
-// of ReadDrawnPoints and LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
+// mesh is taken from the record, and the tile is encoded. If it is requested with a smaller error, the run is
+// continued. Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of
+// ReadDrawnPoints and LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
@@ -50,8 +50,8 @@ class TilePipeline {
   // GLB tile outside availability; heights, a hillshade, slopes or contours deeper than max_mercator_depth; imagery of
   // a dataset without an image; in a dataset without sources, a tile that its archive lacks. kUnavailable: a source
   // cannot be read now. kChanged: a file of a source, of the water mask or of the image was replaced, so the dataset
-  // has to be opened again. kInvalidArgument: a member of the request has a value that TileRequest does not permit.
-  // kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // has to be opened again. kInvalidArgument: `error_step`, `side_px` or a member of `map` that the format uses is out
+  // of its range. kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // As ElevationModel::ReadPoints. Its preconditions hold for the points of all functions below. kNotFound, here and in
@@ -59,27 +59,27 @@ class TilePipeline {
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
-  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up. They are differences over
-  // half the finest source's spacing on each side. NaN where the point has no height, or where on one axis both places
-  // beside it have none. Errors: those of ReadPoints.
+  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up. Slopes are computed from
+  // the heights at half the finest source's spacing on each side of the point. NaN where the point has no height, or
+  // where on one axis both places beside it have none. Errors: those of ReadPoints.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
   // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
-  // level has no tile, the mesh of its deepest available ancestor is read. `normals`: also normals. Keeps meshes
-  // between calls. kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in tiles
-  // whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and its archive has no quantized-mesh
-  // tiles, or the surface is that of kGlb. Other errors: those of Build.
+  // level has no tile, the mesh of the deepest available tile of a lower level is read. `normals`: also normals. Keeps
+  // meshes between calls. kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in
+  // tiles whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and its archive has no
+  // quantized-mesh tiles, or the surface is that of kGlb. Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
-  // ElevationModel::LookAlong. kInvalidArgument: together the rays cross more than 2 x 10^8 samples; over
-  // the sources' surface, an edit changes the ground below a ray or near it (ElevationModel::LookAlong); over a drawn
-  // one, they cross more than 64 tiles, or tiles whose meshes take more than 256 MiB. Other errors: those of ReadPoints
-  // and ReadDrawnPoints.
+  // ElevationModel::LookAlong. kInvalidArgument: the rays together are longer than 2 x 10^8 times the spacing of the
+  // dataset's finest source (without sources: a 256th of a tile's side, at most 500 m); over the sources' surface, a
+  // ray passes near an edit (ElevationModel::LookAlong); over a drawn one, the rays cross more than 64 tiles, or tiles
+  // whose meshes take more than 256 MiB. Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

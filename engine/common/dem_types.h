@@ -20,8 +20,8 @@ namespace terrace::dem {
 // How to interpret the samples of a source.
 struct SourceOptions {
   // The vertical datum: "crs" (as the file states it; if it states none, as "unknown"), "unknown" (heights are used
-  // unchanged, with a warning), "ellipsoid", "egm96", "egm2008", a vertical reference system ("EPSG:5703"), or the
-  // path of a geoid grid.
+  // unchanged, with a warning), "ellipsoid", "egm96", "egm2008", the EPSG code of a vertical reference system
+  // ("EPSG:5703"), or the path of a geoid grid.
   std::string vertical = "crs";
   bool find_voids = true;           // detects undeclared nodata values
   std::vector<double> nodata = {};  // further raw values that mean void
@@ -33,14 +33,15 @@ struct SourceOptions {
 // a place without a raster are collars; where no source has a height, they always show the floor
 // (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
-  kSmooth,  // a harmonic surface between the surrounding heights
+  // A harmonic surface between the surrounding heights. If the voids of a raster are too ragged to tell holes from
+  // collars, all of them are treated as collars, and RasterInfo::warnings says so.
+  kSmooth,
   kFloor,
 };
 
 // The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
-// returns them exactly as stated if it returns the heights of all sources that the edit touches in the edit's datum;
-// with kSource, the floor's height too. Otherwise it converts the edit's heights to the ellipsoid and back, which may
-// change them by millimetres.
+// converts them to the ellipsoid and back, which may change them by millimetres. There is no conversion if the read
+// returns all other heights near the edit in the edit's datum: those of the sources, and with kSource the floor.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
@@ -53,7 +54,8 @@ class AveragesBudget;
 class CacheFolder;
 
 // The storage of statistics of rasters, and of averages of blocks of samples, from which tiles of low levels are read.
-// With a folder, later calls of Open read no raster completely.
+// With a folder, later calls of Open do not read a raster completely if its files have not changed and the folder still
+// has its statistics.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
   // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
@@ -63,16 +65,17 @@ struct RasterCache {
 struct DemOptions {
   SourceOptions source = {};    // for files without options of their own, and for the rasters of edits
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume; > 0
-  // Metres, > 0: the deepest level is the first whose default error is at most this.
+  // Metres, > 0: the deepest level is the first whose default error is at most this, but at most geo::kMaxLevel.
   std::optional<double> finest_error = {};
   // Metres above the ellipsoid, -99,998 .. 99,998; used outside the sources, in collars, and with HoleFill::kFloor in
   // holes. Default: DemInfo::heights.min as it is without edits.
   std::optional<double> floor = {};
-  HoleFill voids = HoleFill::kSmooth;  // in holes; other voids follow `max_void_gap` and `floor`
+  HoleFill holes = HoleFill::kSmooth;  // other voids follow `max_void_gap` and `floor`
   // Samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled.
   int max_void_gap = 64;
   RasterCache cache = {};
-  std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
+  // GeoJSON files (docs/edits.md), in order. Later edits apply over earlier ones, but leave the holes that those cut.
+  std::vector<std::string> edits = {};
   // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, a source is blended with the sources
   // below. At most 256 of the samples, or averages of samples, that the level is read from. 0: hard edges.
   double feather = 0;
@@ -89,8 +92,8 @@ struct DemOptions {
 struct DemFile {
   std::string path;
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
-  // 2^(1/16)), then the path that sorts first. Files of one rank that touch on one pixel grid are one source, with the
-  // path of its first file. The order of the files has no effect.
+  // 2^(1/16)), then the path that sorts first. Files of one rank and one vertical datum that touch on one pixel grid
+  // are one source, with the path of its first file. The order of the files has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;
@@ -155,18 +158,19 @@ struct RasterInfo {
   std::string heights_doubted;               // why they may not be metres, with the remedy; empty: plausible
   HeightRange ellipsoidal;                   // contains all ellipsoidal heights
   std::uint64_t valid_samples = 0, void_samples = 0;
-  std::uint64_t enclosed_samples = 0;  // of voids with data all around them; 0 also if they were not counted
-  std::optional<double> nodata;        // raw value that the file declares, or that its type implies
-  std::string found_voids;             // detected nodata values, for people; empty: none
-  std::vector<int> overview_factors;   // of the overviews that are read
-  std::vector<std::string> warnings;   // what else people should know, each with the remedy
-  std::string overviews_unused;        // why overviews are ignored, with the remedy; empty: none is ignored
+  // Samples of voids with data all around them; also 0 if the voids are too ragged to tell.
+  std::uint64_t enclosed_samples = 0;
+  std::optional<double> nodata;       // raw value that the file declares, or that its type implies
+  std::string found_voids;            // detected nodata values, for people; empty: none
+  std::vector<int> overview_factors;  // of the overviews that are read
+  std::vector<std::string> warnings;  // what else people should know, each with the remedy
+  std::string overviews_unused;       // why the file's overviews are not read, with the remedy; may be empty
   // Why the pass over all samples decodes blocks many times, with the remedy; empty: it does not.
   std::string blocks_too_wide;
   std::string transform;  // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   // Each of the finest stored averages covers N x N samples; this is N. 0: none are stored.
   int min_kept_factor = 0;
-  bool has_averages_in_cache_folder = false;  // false: in memory
+  bool has_averages_in_cache_folder = false;  // false: in memory, or none are stored
 };
 
 // A dataset, as `terrace info` prints it; `/datasets` returns a part of it.
@@ -190,7 +194,8 @@ struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };
 
-// How many samples were read for nodes and pixels. A sample of an overview, or a stored average, counts as one.
+// How many samples were read for nodes and pixels. A sample of an overview, or a stored average, counts as one. Voids
+// that are known from statistics count too, although they are not read.
 struct SampleCounts {
   std::uint64_t measured = 0;
   std::uint64_t filled = 0;  // voids filled from the heights around them

@@ -1,8 +1,9 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
+//
 // Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
 // errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Functions that
-// read, build or encode may throw two exceptions: std::bad_alloc; and ThrownError, if statistics of a source that are
-// not kept in memory can neither be read from the cache folder nor computed again.
+// read, build or encode, and ElevationModel::RangeBound, may throw two exceptions: std::bad_alloc; and ThrownError, if
+// statistics of a source that are not kept in memory can neither be read from the cache folder nor computed again.
 #pragma once
 
 #include <fmt/core.h>
@@ -32,7 +33,9 @@ std::string_view ToString(ErrorCode code);
 
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
-  std::string message;  // one sentence for people: the thing, the place and the remedy; no trailing full stop
+  // For people: the thing, the place and the remedy. One sentence without a full stop at its end; of edits, a line for
+  // each fault.
+  std::string message;
 };
 
 // An Error as an exception.

@@ -147,7 +147,7 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
   if (is_new) {
     DemOptions of_replacement;
     of_replacement.source = options.source;
-    of_replacement.voids = HoleFill::kFloor;  // its voids show what is below, also narrow ones
+    of_replacement.holes = HoleFill::kFloor;  // its voids show what is below, also narrow ones
     of_replacement.max_void_gap = 0;
     if (!edit.source_vertical.empty()) of_replacement.source.vertical = edit.source_vertical;
     of_replacement.cache = options.cache;
@@ -155,6 +155,7 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
     auto model = ElevationModel::Open(edit.source, of_replacement);
     if (!model) {
       opened.erase(known);
+      if (model.error().code == ErrorCode::kCancelled) return tl::unexpected(std::move(model).error());
       return fmt::format("its source: {}", model.error().message);
     }
     replacements.push_back(*std::move(model));

@@ -94,7 +94,7 @@ Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const 
     hasher.Add(number);
   }
   hasher.Add(options.max_void_gap);
-  hasher.Add(static_cast<std::uint8_t>(options.voids));
+  hasher.Add(static_cast<std::uint8_t>(options.holes));
   return hasher.Hash().low;
 }
 
@@ -269,7 +269,7 @@ Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFi
   std::vector<std::string> left_out;
   auto rasters = OpenRasters(files, options, left_out, only_cached);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto grids = GridsOfHeights(files, *rasters, {options.max_void_gap, options.voids, options.feather}, left_out);
+  auto grids = GridsOfHeights(files, *rasters, {options.max_void_gap, options.holes, options.feather}, left_out);
   if (!grids) return tl::unexpected(grids.error());
 
   auto impl = std::make_unique<Impl>();

@@ -28,42 +28,46 @@ struct ContentHash;
 class ElevationModel {
  public:
   // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
-  // raster; a raster that may have undeclared voids takes up to four passes. Relative paths are resolved at each use:
-  // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
+  // raster. A raster that may have undeclared voids, or whose overviews mislead, takes several passes. Relative paths
+  // are resolved at each use: the working directory must not change. The first call sets up GDAL for the whole process
+  // (docs/embedding.md).
+  //
   // Paths name files, not folders. To open a folder, pass its files, each with DemFile::skip_if_no_raster set.
-  // Errors name the file, the fault and the remedy. kNotFound: a file does not exist; a raster has no height; or,
-  // with skip_if_no_raster, all files were skipped or none has a height. kInvalidArgument: an option, a reference
-  // system, a raster or an edit that cannot be used, also if the edit's file or raster cannot be read. kUnavailable: a
-  // file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
+  //
+  // Errors name the file, the fault and the remedy. kNotFound: a file does not exist; a raster has no height; or, with
+  // skip_if_no_raster, all files were skipped or none has a height. kInvalidArgument: an option, a reference system, a
+  // raster or an edit that cannot be used, also if the edit's file or raster cannot be read. kUnavailable: a file
+  // cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled also means that the cache lacks
-  // statistics of a file. An error of another file is returned instead, unless DemOptions::fault is set: then fault
-  // gets it, and kCancelled is returned.
+  // statistics of a file. If another file has an error as well, this error is returned; but if DemOptions::fault is
+  // set, fault gets the error, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
   const DemInfo& info() const;
 
   // The deepest level served: the first whose default error is at most `finest_error`; without that option, at most a
-  // tenth of the finest source's spacing. Deeper, if an edit asks for more precision.
+  // tenth of the finest source's spacing. Deeper, if an edit asks for more precision. At most geo::kMaxLevel.
   int max_level() const;
   // What max_level() would be if there were no edits. Deeper levels have tiles only around edits.
   int max_source_level() const;
   // Precondition: 0 .. geo::kMaxLevel.
   geo::Lattice LatticeOf(int level) const;
 
-  // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
-  // fine enough for the level, tiles that edits add, the ancestors of these, and the siblings of all of them. A level
-  // with too many ranges gets fewer and larger ones, which also have tiles outside all sources. Level 0 has both roots.
+  // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap the bounds,
+  // in degrees, of a raster that is fine enough for the level; tiles that edits add, and tiles around them; the
+  // ancestors of these, and the siblings of all of them. A level with too many ranges gets fewer and larger ones. So
+  // some tiles lie outside all sources. Level 0 has both roots.
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
   const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
   // A range that contains all heights of the tile's samples, without the halo, from the statistics alone. Accepts any
-  // valid key; tiles that neither a source nor an edit reaches hold only the floor.
+  // valid key; tiles that neither a source nor an edit reaches hold only the floor. May throw ThrownError.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid. Precondition: a valid key.
@@ -93,7 +97,8 @@ class ElevationModel {
                                                std::stop_token stop = {}) const;
 
   // Heights at the sources' full resolution, bilinear between samples and rounded to 2^-10 m, in the order of `points`.
-  // NaN where no source has a height: outside the sources, in collars, and with HoleFill::kFloor in holes. Other voids
+  // NaN where no source has a height: outside the sources, in collars, with HoleFill::kFloor in holes, and where the
+  // geoid that a conversion needs has no value. At the poles, all longitudes have one height, as in tiles. Other voids
   // are filled as in tiles; a feather has no effect. `filled` has one element for each point, or none; an element is 1
   // if the sample nearest to the point is void in the source that gives the height, and 0 elsewhere. Edits apply: NaN
   // in holes that they cut. Where no source has a height, the height that an edit sets is returned if `datum` is
@@ -107,7 +112,7 @@ class ElevationModel {
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
   // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a ray passes above the box around an edit that
-  // changes heights or cuts a hole, or perhaps up to 125 m beside this box.
+  // changes heights or cuts a hole. A ray that passes within 125 m of such a box may be refused, too.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 
@@ -117,7 +122,8 @@ class ElevationModel {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool has_geoid() const;
 
-  // Samples read since Open for nodes and pixels, not for points and rays, by all threads. For metrics.
+  // Samples read since Open for nodes and pixels, not for points and rays, by all threads; without the rasters of
+  // `replace` edits. For metrics.
   SampleCounts CountSamples() const;
   // Blocks that the process keeps now, of all models. For metrics.
   static KeptBlocks CountKeptBlocks();
@@ -128,10 +134,12 @@ class ElevationModel {
   // The same without edits.
   std::uint64_t unedited_fingerprint() const;
 
-  // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.
+  // Whether the data of a source (not of an edit's raster) in the cache folder can no longer be read. Its tiles then
+  // take longer until it is reopened.
   bool has_lost_cache() const;
 
-  // All files that heights depend on, with their stamps at Open: of sources, geoid grids and edits.
+  // The files of sources, of the geoid grids that they refer to, and of edits, with their stamps at Open. Grids of PROJ
+  // that place rasters, and EGM96 if only edits need it, are not among them.
   StampedFiles files() const;
 
  private:

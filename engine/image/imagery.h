@@ -29,7 +29,8 @@ struct MapPicture {
   std::vector<std::uint8_t> rgba;  // 4 * side * side
 };
 
-// Where an image lies, and the deepest levels that its map tiles need: the first whose pixels are as fine as its own.
+// Where an image lies, and the deepest levels of its map tiles. They are the first levels whose pixels are as fine as
+// those of the image, and at most geo::kMaxLevel.
 struct ImageExtent {
   GeoBounds bounds;
   int max_mercator_depth = 1;  // depth d: a grid of 256 << d pixels around the Earth
@@ -42,13 +43,13 @@ class Imagery {
   // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // Opens a georeferenced image in 8 or 16 bits per band. Its bands are grey with or without alpha; a palette; bands
-  // that state red, green and blue; or 3 or 4 bands that do not state them, of which the first three are taken as red,
-  // green and blue. `around`: the bounds of the dataset (DemInfo::bounds). `path`
-  // is resolved at each use. `content`: where hashes of large files are stored, and the token that stops Open.
-  // kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference,
-  // bands that are not colours, or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it
-  // cannot be read. kCancelled: stopped.
+  // Opens a georeferenced image with unsigned samples of 8 or 16 bits. Its bands are grey with or without alpha; a
+  // palette; bands that state red, green and blue; or 3 or 4 bands that do not state them, of which the first three are
+  // taken as red, green and blue. `around`: the bounds of the dataset (DemInfo::bounds). `path` is resolved at each
+  // use. `content`: where hashes of large files are stored, and the token that stops Open. kNotFound: there is no such
+  // file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference, bands that are not colours,
+  // or an image outside `around`. kChanged: a file was replaced meanwhile. kUnavailable: it cannot be read. kCancelled:
+  // stopped.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();
@@ -60,9 +61,10 @@ class Imagery {
 
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
   // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that
-  // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; `side`
-  // is a power of two from kMinSide to kMaxSide. kUnavailable: the image cannot be read now. kChanged: a file was
-  // replaced. kCancelled: stopped.
+  // are fine enough, if they have the mask and the nodata values of the image. A pixel depends only on its level,
+  // `side` and global position. Preconditions: a valid key; `side` is a power of two from kMinSide to kMaxSide.
+  // kUnavailable: the image cannot be read now. kChanged: a file was replaced. kInvalidArgument: too many pixels of the
+  // image are needed at once. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
   // Pictures for maps with `side` x `side` pixels, by the rules of Read. ReadMercator: of a Web Mercator grid, from the

@@ -31,9 +31,10 @@ class WaterRaster {
   // between are the share of water in a pixel on the coast. Pixels outside the raster or without data are land. A pixel
   // depends only on its level and global position. Each sample counts as 1 (water) if it is not zero, else as 0. If the
   // raster is finer than the pixels, these values are averaged. If it is coarser, they are interpolated, and the coast
-  // is the line at one half, as sharp as the pixels allow. Overviews are used. Make them with `gdaladdo -r nearest` or
-  // `-r mode`: other methods give samples along the coast that are not zero, and these count as water. Precondition: a
-  // valid key. kUnavailable: the raster cannot be read now. kChanged: a file was replaced. kCancelled: stopped.
+  // is the line at one half, as sharp as the pixels allow. Overviews are used, if they have the mask of the raster.
+  // Make them with `gdaladdo -r nearest` or `-r mode`: other methods give samples along the coast that are not zero,
+  // and these count as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kChanged: a file
+  // was replaced. kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // A hash of the bytes of its files and of their georeference. Copies have the same hash.

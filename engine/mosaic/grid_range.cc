@@ -120,7 +120,7 @@ std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) con
     const Box wide{west - halo, north - halo, east + halo, south + halo};
     return Ranges(wide).has_enclosed_voids || voids_.SharesHole(wide);
   };
-  if (options_.voids != HoleFill::kSmooth || !has_holes(box.min_x, box.min_y, box.max_x, box.max_y)) {
+  if (options_.holes != HoleFill::kSmooth || !has_holes(box.min_x, box.min_y, box.max_x, box.max_y)) {
     return std::nullopt;
   }
   // The holes end where a surrounding band has none.
@@ -182,7 +182,7 @@ std::vector<std::size_t> RasterGrid::MembersBelow(const geo::TileKey& top, const
 void RasterGrid::AddTo(ContentHasher& hasher) const {
   for (const int number : {width_, height_, columns_, alignment_, options_.max_void_gap}) hasher.Add(number);
   hasher.Add(wraps_);
-  hasher.Add(static_cast<std::uint8_t>(options_.voids));
+  hasher.Add(static_cast<std::uint8_t>(options_.holes));
   for (const double number : {spacing_.east, spacing_.north, spacing_.finer, spacing_.latitude, reach_.west,
                               reach_.south, reach_.east, reach_.north, options_.feather_m}) {
     hasher.Add(number);

@@ -134,7 +134,7 @@ Result<RasterGrid> RasterGrid::Make(GridPlan plan, const GridOptions& options) {
   grid.IndexMembers();
   grid.MeasureMembers();
   grid.FindPoleHeights();
-  if (options.voids == HoleFill::kSmooth) {
+  if (options.holes == HoleFill::kSmooth) {
     grid.voids_ = GridVoids(grid.members_, grid.member_index_, grid.wraps_ ? grid.columns_ : 0);
   }
   if (const auto& geoid = grid.vertical().geoid) {
@@ -239,7 +239,7 @@ bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
   const GridWindow around = Grown(window, options_.max_void_gap / factor + 6, factor);
   const BlockRange range = Ranges(PixelsOf(around, factor));
   if (range.min <= range.max) return false;
-  if (options_.voids != HoleFill::kSmooth) return true;
+  if (options_.holes != HoleFill::kSmooth) return true;
   // All of the window is one void, so that any average tells whether it is a hole.
   const GridWindow first{window.column, window.row, 1, 1};
   return voids_.HolesIn(members_, member_index_, factor, first, Columns(factor).count(), NaNHeights(1)).front() == 0;

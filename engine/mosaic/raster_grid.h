@@ -58,7 +58,7 @@ struct GridReading {
 
 struct GridOptions {
   int max_void_gap = 0;  // samples: narrower voids are filled
-  HoleFill voids = HoleFill::kSmooth;
+  HoleFill holes = HoleFill::kSmooth;
   // Width in metres of the blend into the raster grids below, inwards from edges and voids; 0: no blend.
   double feather_m = 0;
 };

@@ -5,11 +5,11 @@
 // and problem() has the reason. Programs use the constructor, path(), Trim() and problem(); all other functions are for
 // terrace's own code.
 //
-// Several processes may share it. Before a file grows, files that this process does not use are removed, the least
-// recently used first, until an eighth of the budget is free. Files in use may fill the whole budget. Loading a file
-// counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's modification
-// time. Other files, such as the hashes of file_content.h, are neither counted nor removed: a file is recognized by its
-// name and its first bytes.
+// Several processes may share it; each needs one object for it. Before a file grows, files that no model of this object
+// uses are removed, the least recently used first, until an eighth of the budget is free. Files in use may fill the
+// whole budget. Loading a file counts as use, and so do reads of averages, at most once an hour; the time of the last
+// use is the file's modification time. Other files, such as the hashes of file_content.h, are neither counted nor
+// removed: a file is recognized by its name and its first bytes.
 #pragma once
 
 #include <chrono>
@@ -67,7 +67,8 @@ class CacheFolder {
   // Removes files until the budget is met. Logs a warning if files in use exceed it.
   void Trim();
 
-  // The reason why a file in use is not stored, without its path. Empty: all are stored.
+  // The reason why a file in use could not be stored, without its path. Empty: none is known. Of damaged files, which
+  // are removed, ElevationModel::has_lost_cache tells.
   std::string problem() const;
 
  private:

@@ -5,9 +5,10 @@
 
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. Positions are rounded to a grid, whose step depends on level and error, and
-// stored as integers or as floats. kDraco and kNone have one grid and decode to the same positions, bit for bit; so do
-// kQuantized and kMeshopt, whose grid may be coarser.
+// How the mesh of a GLB tile is stored. Positions are rounded to a grid and stored as integers or as floats. The step
+// of the grid depends on level, error, lattice and edits, and is doubled in tiles with extreme cliffs. kDraco and kNone
+// have one grid and decode to the same positions, bit for bit; so do kQuantized and kMeshopt, whose grid may be
+// coarser.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats

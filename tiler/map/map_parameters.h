@@ -1,4 +1,4 @@
-// Parameters of tiles for maps that change their bytes, in whole numbers, so that equal requests have one form.
+// The parameters that the bytes of a map tile depend on. They are whole numbers, so that equal requests have one form.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct MapParameters {
   // kHillshade only.
   std::uint16_t azimuth_deg = 315;               // where the light comes from, clockwise from north, 0 .. 359
   std::uint8_t altitude_deg = 45;                // of the light above the horizon, 0 .. 90
-  std::uint16_t z_factor_hundredths = 100;       // heights are multiplied by it, 1 .. 10000
+  std::uint16_t z_factor_hundredths = 100;       // heights are multiplied by a hundredth of it, 1 .. 10000
   SlopeStyle slope_style = SlopeStyle::kColors;  // kSlope only
   // kContours only: between contours; requests must set it. The encoder multiplies it by 5 until the tile has few
   // enough points.

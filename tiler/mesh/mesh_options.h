@@ -1,4 +1,6 @@
-// Meshing options of a dataset.
+// How the quantized-mesh and GLB tiles of a dataset are meshed. Meshes of areas do not use these options. Tiles in
+// which an edit cuts a hole, and tiles in which rounding turned a triangle over, are made with kDelaunay in any case;
+// the latter are not compacted.
 #pragma once
 
 #include "engine/tin/criterion.h"

@@ -1,4 +1,4 @@
-// Tiles to erase from caches: those of one dataset between two levels that overlap a box.
+// Which tiles to erase from caches: those of one dataset that overlap a box and have one of a range of levels.
 #pragma once
 
 #include <cstdint>

@@ -20,8 +20,9 @@
 
 namespace terrace::tiler {
 
-// A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
-// generation identifies the dataset: keys stay valid while other datasets are added or removed.
+// A request and the generation of its dataset. If Dataset::generation was set to GenerationOf, a replaced source never
+// gets tiles of the old one, and keys stay valid while other datasets are added or removed. If it was left at 0, the
+// generation is a position, and neither holds (tiler/dataset.h).
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
   // Dataset::cache_generation() of the dataset in TilePipeline::datasets(). That of the Dataset that was passed to the
@@ -44,12 +45,12 @@ inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
   return selection.Contains(key.generation, key.request.key, IsMercator(key.request.format));
 }
 
-struct StoreStats : CacheStats {  // entries and bytes: approximate
+struct StoreStats : CacheStats {  // entries and bytes: approximate; 0 if the store does not know them
   std::uint64_t errors = 0;       // reads and writes that failed
-  std::uint64_t damaged = 0;      // records with a wrong checksum, which were erased
+  std::uint64_t damaged = 0;      // records that are not intact; the store erases them if it can
   std::uint64_t written = 0;
-  std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
-  bool on = false;            // both finding and writing work; false: switched off, or only one of them works
+  std::uint64_t dropped = 0;  // changes not written: the medium failed, the queue was full, or Abandon was called
+  bool on = false;  // finding works, and writing if the store writes at all; false: switched off, or one of them fails
   // For a store on a network: look-ups that timed out; look-ups that were skipped, because the store was switched off
   // or seldom has such tiles; how often it was switched off.
   std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;
@@ -78,9 +79,9 @@ class StoreBase {
 template <typename Key, typename Value>
 class Store : public StoreBase {
  public:
-  // Returns a copy, or nothing if the key is absent. A store keeps these members of a tile: `bytes`, `etag`,
-  // `max_error_m`, `certified_error_m`, `vertices` and `triangles`. Find leaves the others at their defaults; TileTiers
-  // then sets `found_in` and `header_lines`.
+  // Returns a copy, or nothing if the key is absent or cannot be read. A store keeps these members of a tile: `bytes`,
+  // `etag`, `max_error_m`, `certified_error_m`, `vertices` and `triangles`. Find leaves the others at their defaults;
+  // TileTiers then sets `found_in` and `header_lines`.
   virtual std::optional<Value> Find(const Key& key) = 0;
 
   // Replaces the value of an existing key.

@@ -1,5 +1,6 @@
 // The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order; the tier
-// that has it fills the tiers above. If none has it, it is built and goes into all of them.
+// that has it fills the tiers above. If none has it, it is built and goes into all of them. Stores may drop tiles, and
+// memory does not keep a tile that is larger than a 16th of its size.
 //
 // Thread-safe. Look-ups of one key are not joined: two threads that ask for a tile at once may both build it.
 #pragma once
@@ -50,8 +51,8 @@ class TileTiers {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // with the store's name; the slowest first
   };
-  // Erases the selected tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors:
-  // those of the stores. If one fails, the others are erased nevertheless.
+  // Erases the selected tiles from all tiers. Calls of FindOrBuild that have begun may still insert such tiles
+  // afterwards. Blocks. Errors: those of the stores. If one fails, the others are erased nevertheless.
   Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
 
   // The sum of the durations of look-ups in each store.

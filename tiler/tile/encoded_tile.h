@@ -21,7 +21,7 @@ struct StageTimes {
 enum class RefinementUse : std::uint8_t {
   kMade,       // there was none: samples were inserted from the beginning
   kContinued,  // there was one for a larger error: its run was continued
-  kReplayed,   // there was one for this error or a smaller one: no insertion
+  kReplayed,   // there was one for this error or a smaller one: its mesh was taken from the record of insertions
   kNone,       // not used: formats without a mesh, meshes of areas, tiles that were not built
 };
 
@@ -37,8 +37,9 @@ struct EncodedTile {
   std::string bytes;  // the body in its content coding
   std::string etag;   // strong, with the quotes
   // The Terrain-Max-Error header, metres: the largest vertical distance between the tile's samples and the mesh that
-  // clients decode, measured on the encoded integers. Of height PNGs: the largest rounding of a height to a colour. Of
-  // area meshes: as BuildAreaMesh says. Of other formats: 0.
+  // clients decode, measured on the encoded integers. Of height PNGs: the largest distance of a height from what its
+  // colour decodes to, also where the height is out of the encoding's range. Of area meshes: as BuildAreaMesh says. Of
+  // other formats: 0.
   double max_error_m = 0;
   // The Terrain-Certified-Error header, metres: an upper bound of the distance to every sample of the sources, each
   // after the edits that apply to that sample. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.

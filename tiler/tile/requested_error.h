@@ -13,7 +13,8 @@ namespace terrace::tiler {
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of geo::LevelError, the error that clients assume for the level; finite, > 0
-  bool at_least = false;           // with error_m: on levels shallower than max_source_level, at least geo::DefaultError is requested
+  // With error_m: on levels shallower than max_source_level, the larger of error_m and geo::DefaultError is requested.
+  bool at_least = false;
 };
 
 // What a dataset's steps depend on besides the request.

@@ -43,9 +43,11 @@ struct TileRequest {
   int error_step = 0;
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
-  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only; no effect without an image
+  // kGlb only; no effect without an image. In a dataset without sources it must be that of the archive.
+  proto::TextureFormat texture = proto::TextureFormat::kNone;
   Coding coding = Coding::kIdentity;
-  proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
+  // kQuantizedMesh only: included if the tile has them. In a dataset without sources the archive's tile must have them.
+  proto::TileExtensions extensions;
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
   // Pixels along an edge: kHeightPng, and map layers except kContours. In Web Mercator formats their depth
   // (ElevationModel::ReadMercator) is key.level if there are 256, and key.level + 1 if there are 512.

@@ -80,7 +80,7 @@ Result<std::unique_ptr<dem::ElevationModel>> OpenModel(const config::DatasetConf
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;
   options.max_void_gap = wanted.max_void_gap;
-  options.voids = wanted.voids;
+  options.holes = wanted.voids;
   options.cache = cache;
   options.feather = wanted.feather;
   options.edits = wanted.edits;

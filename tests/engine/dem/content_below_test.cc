@@ -160,7 +160,7 @@ DemOptions Options(double feather, HoleFill voids) {
   DemOptions options;
   options.floor = 0;
   options.feather = feather;
-  options.voids = voids;
+  options.holes = voids;
   return options;
 }
 
@@ -226,7 +226,7 @@ TEST(ContentBelow, OptionsAndLowestLevelCount) {
   EXPECT_NE(hash, ContentBelow(*source, top, 9));
   for (const auto& change : std::vector<std::function<void(DemOptions&)>>{
            [](DemOptions& o) { o.floor = 1; }, [](DemOptions& o) { o.feather = 100; },
-           [](DemOptions& o) { o.voids = HoleFill::kFloor; }, [](DemOptions& o) { o.max_void_gap = 5; },
+           [](DemOptions& o) { o.holes = HoleFill::kFloor; }, [](DemOptions& o) { o.max_void_gap = 5; },
            [](DemOptions& o) { o.source.vertical = "egm96"; }}) {
     DemOptions options = Options(0, HoleFill::kSmooth);
     change(options);

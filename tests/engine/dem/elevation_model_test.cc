@@ -159,7 +159,7 @@ TEST(ElevationModel, FingerprintFollowsOptions) {
   EXPECT_NE(OpenOrFail(path, {.max_void_gap = 3})->fingerprint(), before);
   EXPECT_NE(OpenOrFail(path, {.error_fraction = 0.4})->fingerprint(), before);
   EXPECT_NE(OpenOrFail(path, {.finest_error = 3})->fingerprint(), before);
-  EXPECT_NE(OpenOrFail(path, {.voids = HoleFill::kFloor})->fingerprint(), before);
+  EXPECT_NE(OpenOrFail(path, {.holes = HoleFill::kFloor})->fingerprint(), before);
   EXPECT_NE(OpenOrFail(path, {.feather = 30})->fingerprint(), before);
 }
 

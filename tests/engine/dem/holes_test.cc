@@ -156,7 +156,7 @@ TEST(Holes, AreNoneWhereAVoidTouchesTheRim) {
 TEST(Holes, ShowTheFloorWhereTheOwnerWantsThat) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, Raster(400, 400, Plane, Box(100, 100, 200, 200)));
-  const auto source = OpenOrFail(path, {.floor = kFloor, .voids = HoleFill::kFloor});
+  const auto source = OpenOrFail(path, {.floor = kFloor, .holes = HoleFill::kFloor});
   const auto smooth = OpenOrFail(path, {.floor = kFloor});
   ASSERT_TRUE(source && smooth);
   EXPECT_NE(source->fingerprint(), smooth->fingerprint());
@@ -344,7 +344,7 @@ TEST(Holes, GoAcrossFilesWithoutAHeight) {
 TEST(Holes, NeedNoFilesWithoutAHeightForTheFloor) {
   const TempDir dir;
   const auto model =
-      OpenOrFail(WritePieces(dir, 4, 3, Box(80, 80, 140, 140)), {.floor = kFloor, .voids = HoleFill::kFloor});
+      OpenOrFail(WritePieces(dir, 4, 3, Box(80, 80, 140, 140)), {.floor = kFloor, .holes = HoleFill::kFloor});
   ASSERT_NE(model, nullptr);
   EXPECT_EQ(model->info().sources.size(), 11u);
 }
@@ -419,7 +419,7 @@ TEST(Holes, AreWithinTheRangeBound) {
   const VoidAt is_void = [&](int c, int r) { return holes(c, r) || collar(c, r); };
   const std::string path = WriteRaster(dir, Raster(600, 550, peaks, is_void));
   const auto source = OpenOrFail(path, {.floor = kFloor});
-  const auto floor_only = OpenOrFail(path, {.floor = kFloor, .voids = HoleFill::kFloor});
+  const auto floor_only = OpenOrFail(path, {.floor = kFloor, .holes = HoleFill::kFloor});
   ASSERT_TRUE(source && floor_only);
   int tiles_of_collar = 0;
   for (const int level : {9, 11, 13}) {

@@ -129,7 +129,7 @@ TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloorOnDemand) {
     const bool large = std::abs(col - 280) < 60 && std::abs(row - 280) < 60;
     return small || large ? -500 : plane(col, row);
   };
-  const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = -9, .voids = HoleFill::kFloor});
+  const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = -9, .holes = HoleFill::kFloor});
   const auto at = [&](double longitude, double latitude) {
     const int level = source->max_level();
     const double size = 180.0 / static_cast<double>(geo::TileRows(level));
