@@ -39,9 +39,9 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. An edit states its heights in a datum of its own. A read in kOrthometric or kSource
-// converts them to the ellipsoid and back, which may change them by millimetres. There is no conversion if the read
-// returns all other heights near the edit in the edit's datum: those of the sources, and with kSource the floor.
+// The vertical datum of heights. An edit states its heights in a datum of its own. They are not converted if a read in
+// kOrthometric or kSource returns the heights of all sources near the edit, and with kSource also the floor, in that
+// same datum. Otherwise such a read converts them to the ellipsoid and back, which may change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid

@@ -140,7 +140,7 @@ Result<std::vector<float>> RasterGrid::ReadSmooth(int factor, const GridWindow& 
 
 Result<std::vector<float>> RasterGrid::FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                                  const std::stop_token& stop) const {
-  if (options_.voids != HoleFill::kSmooth || bridged.voids == 0) return std::vector<float>();
+  if (options_.holes != HoleFill::kSmooth || bridged.voids == 0) return std::vector<float>();
   const auto holes = voids_.HolesIn(members_, member_index_, factor, window, Columns(factor).count(), bridged.heights);
   const GridWindow hull = HullOfMarks(holes, window);
   if (hull.columns == 0) return std::vector<float>();

@@ -45,11 +45,12 @@ Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fractio
                           std::size_t max_samples);
 
 // Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
-// the flat triangles, with those in holes, which the file does not have. They are flat in the file's coordinates: in
-// space, or for kGeographic in longitude, latitude and height. In space, a vertex of a nearly upright triangle counts
-// with its distance from its sample in any direction. Rounding to 32 bits in a GLB is not included. Precondition:
-// `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a hole that edits cut, or the
-// mesh exceeds the limits of the file format. Other errors: those of ElevationModel::ReadNodes.
+// the flat triangles. Triangles in holes count, too, although the file does not have them. All triangles are flat in
+// the file's coordinates: in space, or for kGeographic in longitude, latitude and height. In space, a vertex of a
+// nearly upright triangle counts with its distance from its sample in any direction. Rounding to 32 bits in a GLB is
+// not included. Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a
+// hole that edits cut, or the mesh exceeds the limits of the file format. Other errors: those of
+// ElevationModel::ReadNodes.
 Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 
