@@ -107,7 +107,7 @@ DEM_FILES = r"engine/(?!core/|geo/|tin/)\w+"  # of the modules of DEM, and of en
 LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
-    Library("Highway", r"hwy/.*", r"(engine/(bound|gdal|geo|raster|statistics|tin)|proto/(error|mesh))/.*(\.cc|-inl\.h)"),
+    Library("Highway", r"hwy/.*", r"(engine/(bound|crs|gdal|geo|raster|statistics|tin)|proto/(error|mesh))/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"(engine/(gdal|crs|raster|statistics|sources|image|export)/|archive/files/bucket\.cc)"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),

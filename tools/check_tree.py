@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Checks what compilers do not: machine paths, package hosts and leftovers in all text files of the tree.
+"""Checks what compilers do not: machine paths, package hosts and leftovers in all text files of the tree, and crowded folders.
 
     tools/check_tree.py               check; exit status 1 and one line for each finding
     tools/check_tree.py --self-test   check the checker
 """
+import collections
 import os
 import pathlib
 import re
@@ -75,6 +76,16 @@ def findings(name, text):
         yield f"{name}: does not end in a line feed"
 
 
+MAX_SOURCES = 25  # of C++ in a folder of the product
+
+
+def crowded_folders(names):
+    counts = collections.Counter(name.rpartition("/")[0] for name in names if name.endswith((".cc", ".h")) and not name.startswith("tests/"))
+    for folder, count in counts.items():
+        if count > MAX_SOURCES:
+            yield f"{folder}: {count} sources, more than {MAX_SOURCES}: divide it or move some to the module that uses them"
+
+
 class SelfTest(unittest.TestCase):
     def test_findings(self):
         for text in ("https://registry" ".npmjs.org/cesium\n", "cd /wo" "rk/main\n", "'/ho" "me/ann/dem.tif'\n", "<<<<" "<<< HEAD\n", "int kMo" "stTiles;\n", "// a shee" "t of rasters\n",
@@ -94,20 +105,26 @@ class SelfTest(unittest.TestCase):
                 self.assertEqual(list(findings("a.h" if "pragma" in text else "a.cc", text)), [])
         self.assertEqual(list(findings("a-inl.h", "#if defined(A) == defined(HWY_TARGET_TOGGLE)\n")), [])
 
+    def test_crowded_folders(self):
+        names = [f"engine/a/{k}.h" for k in range(MAX_SOURCES)] + ["engine/a/b/c.cc", "engine/a/CMakeLists.txt"]
+        self.assertEqual(list(crowded_folders(names)), [])
+        self.assertEqual(len(list(crowded_folders([*names, "engine/a/z.cc"]))), 1)
+
 
 def main():
     if sys.argv[1:] == ["--self-test"]:
         unittest.main(argv=sys.argv[:1])
-    checked, found = 0, []
-    for path in files():
-        if not path.is_file() or CORPUS.match(path.relative_to(ROOT).as_posix()):
+    names = [path.relative_to(ROOT).as_posix() for path in files() if path.is_file()]
+    checked, found = 0, list(crowded_folders(names))
+    for name in names:
+        if CORPUS.match(name):
             continue
         try:
-            text = path.read_text(encoding="utf-8")
+            text = (ROOT / name).read_text(encoding="utf-8")
         except UnicodeDecodeError:
             continue  # binary
         checked += 1
-        found += findings(path.relative_to(ROOT).as_posix(), text)
+        found += findings(name, text)
     print(*found, sep="\n", end="\n" if found else "")
     print(f"{checked} files, {len(found)} findings")
     return 1 if found or not checked else 0

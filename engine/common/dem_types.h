@@ -39,9 +39,8 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights. An edit states its heights in a datum of its own. They are not converted if a read in
-// kOrthometric or kSource returns the heights of all sources near the edit, and with kSource also the floor, in that
-// same datum. Otherwise such a read converts them to the ellipsoid and back, which may change them by millimetres.
+// The vertical datum of the heights that a read returns. Heights that edits set in another datum are converted, which
+// may change them by millimetres (docs/edits.md).
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
@@ -93,7 +92,7 @@ struct DemFile {
   std::string path;
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
   // 2^(1/16)), then the path that sorts first. Files of one rank and one vertical datum that touch on one pixel grid
-  // are one source, with the path of its first file. The order of the files has no effect.
+  // are one source, with the path of the first of them. The order of the list has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;

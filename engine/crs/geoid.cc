@@ -14,7 +14,7 @@
 #include <system_error>
 
 #include "engine/core/plain_number.h"
-#include "engine/gdal/proj_handle.h"
+#include "engine/crs/proj_handle.h"
 
 namespace terrace::dem {
 namespace {

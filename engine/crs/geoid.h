@@ -11,10 +11,10 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/crs/operation_pool.h"
 #include "engine/crs/projector.h"
 #include "engine/crs/undulation_grid.h"
 #include "engine/gdal/file_content.h"
-#include "engine/gdal/operation_pool.h"
 #include "engine/geo/geo_bounds.h"
 
 namespace terrace::dem {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/gdal/proj_handle.h"
+#include "engine/crs/proj_handle.h"
 
 namespace terrace::dem {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "engine/crs/operation_pool.h"
 #include "engine/gdal/file_stamp.h"
-#include "engine/gdal/operation_pool.h"
 
 namespace terrace::dem {
 

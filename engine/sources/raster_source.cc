@@ -10,9 +10,9 @@
 
 #include "engine/common/source_log.h"
 #include "engine/gdal/raster_file.h"
-#include "engine/gdal/sample_messages.h"
 #include "engine/sources/located_raster.h"
 #include "engine/sources/raster_warnings.h"
+#include "engine/sources/sample_messages.h"
 
 namespace terrace::dem {
 namespace {

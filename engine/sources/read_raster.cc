@@ -10,8 +10,8 @@
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
 #include "engine/gdal/raster_file.h"
-#include "engine/gdal/sample_messages.h"
 #include "engine/gdal/sample_rules.h"
+#include "engine/sources/sample_messages.h"
 #include "engine/statistics/sample_rows.h"
 #include "engine/statistics/undeclared_nodata.h"
 

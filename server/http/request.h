@@ -128,8 +128,8 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
 // log and for the form of the reply. The request is not served.
 Request RefusedRequestOf(std::string_view bytes);
 
-// The header of a connection's previous request, as bytes; none if that had a body or an unusual first line. For a next
-// request with the same header only the first line is parsed.
+// The header of a connection's previous request, as bytes; none if that had a body, `Expect: 100-continue` or an
+// unusual first line. For a next request with the same header only the first line is parsed.
 struct HeadMemo {
   std::string bytes;  // all after the first line; empty: none
   bool keep_alive = true;

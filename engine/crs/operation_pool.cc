@@ -1,6 +1,6 @@
-#include "engine/gdal/operation_pool.h"
+#include "engine/crs/operation_pool.h"
 
-#include "engine/gdal/proj_handle.h"
+#include "engine/crs/proj_handle.h"
 
 namespace terrace::dem {
 

@@ -1,4 +1,4 @@
-#include "engine/gdal/sample_messages.h"
+#include "engine/sources/sample_messages.h"
 
 #include <fmt/format.h>
 
