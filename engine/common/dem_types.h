@@ -29,9 +29,9 @@ struct SourceOptions {
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
 };
 
-// The surface in a hole. A hole is a large void with data all around it and no height from any source. Voids that touch
-// a place without a raster are collars; where no source has a height, they always show the floor
-// (docs/decisions/0015-voids.md).
+// The surface in a hole. Voids that are narrower than DemOptions::max_void_gap are filled from their edges. Among the
+// others, a hole has data all around it and no height from any source. Those that touch a place without a raster are
+// collars; where no source has a height, they always show the floor (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
   // A harmonic surface between the surrounding heights. If the voids of a raster are too ragged to tell holes from
   // collars, all of them are treated as collars, and RasterInfo::warnings says so.

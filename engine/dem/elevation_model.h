@@ -97,7 +97,7 @@ class ElevationModel {
                                                std::stop_token stop = {}) const;
 
   // Heights at the sources' full resolution, bilinear between samples and rounded to 2^-10 m, in the order of `points`.
-  // NaN where no source has a height: outside the sources, in collars, with HoleFill::kFloor in holes, and where the
+  // NaN where no source has a height: outside the sources; in collars; in holes, with HoleFill::kFloor; and where the
   // geoid that a conversion needs has no value. At the poles, all longitudes have one height, as in tiles. Other voids
   // are filled as in tiles; a feather has no effect. `filled` has one element for each point, or none; an element is 1
   // if the sample nearest to the point is void in the source that gives the height, and 0 elsewhere. Edits apply: NaN

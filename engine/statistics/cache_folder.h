@@ -67,8 +67,9 @@ class CacheFolder {
   // Removes files until the budget is met. Logs a warning if files in use exceed it.
   void Trim();
 
-  // The reason why a file in use could not be stored, without its path. Empty: none is known. Of damaged files, which
-  // are removed, ElevationModel::has_lost_cache tells.
+  // Why a file in use could not be stored, or that a stored one is gone or cannot be read; without its path. Empty:
+  // nothing is known. A damaged file is discarded without a report here. ElevationModel::has_lost_cache is true for
+  // damaged files and for files that are gone.
   std::string problem() const;
 
  private:

@@ -40,12 +40,12 @@ enum class Side : std::uint8_t {
 //   scale * min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
 // In a field with limits (sample_limits.h), let W be SampleLimits::WeightedError. A sample with a limit and m > 0 has
 //   scale * W(max((m + p) * weight, m + p + step_m))  with p = rounding * |h_b - h_a| / (b - a).
-// All other samples have scale * W(the min above). W puts forced samples first.
-// `weight` makes room for rounding that grows with the error, `padding_m` for that of positions at the steepest step of
-// the border, `step_m` for half the border's step of heights at the smallest error, and p for rounding of positions
-// along the sample's own chord. The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample.
-// The error depends on the samples of this border alone: two fields that share a border with equal heights and options
-// insert the same border vertices, whatever their interiors are.
+// All other samples have scale * W(the min above). W puts forced samples first. `weight` makes room for rounding that
+// grows with the error, `padding_m` for the rounding of positions where the border is steepest, `step_m` for half the
+// unit to which heights are rounded at the smallest error, and p for the rounding of positions along the sample's own
+// chord. The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the
+// samples of this border alone: two fields that share a border with equal heights and options insert the same border
+// vertices, whatever their interiors are.
 struct BorderOptions {
   double weight = 1;
   double padding_m = 0;

@@ -39,18 +39,18 @@ struct AreaPlan {
 };
 
 // kInvalidArgument, with a message for the client: a value that AreaRequest does not permit; the area does not
-// intersect the model, or does so in two parts (one on each side of longitudes outside the model's bounds), or needs
-// more than `max_samples`, or more than 32,768 samples on a side.
+// intersect the model; it intersects the model in two parts, one on each side of longitudes that the model does not
+// cover; it needs more than `max_samples`, or more than 32,768 samples on a side.
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 
 // Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
 // the flat triangles. Triangles in holes count, too, although the file does not have them. All triangles are flat in
-// the file's coordinates: in space, or for kGeographic in longitude, latitude and height. In space, a vertex of a
-// nearly upright triangle counts with its distance from its sample in any direction. Rounding to 32 bits in a GLB is
-// not included. Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a
-// hole that edits cut, or the mesh exceeds the limits of the file format. Other errors: those of
-// ElevationModel::ReadNodes.
+// the file's coordinates: in space, or for kGeographic in longitude, latitude and height. In space, the straight
+// distance between a vertex and its sample counts where it is smaller than the vertical one, as beside nearly upright
+// triangles. Rounding to 32 bits in a GLB is not included. Precondition: `plan` is PlanArea's for this model and area.
+// kInvalidArgument: all of the area lies in a hole that edits cut, or the mesh exceeds the limits of the file format.
+// Other errors: those of ElevationModel::ReadNodes.
 Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 
