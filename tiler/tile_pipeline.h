@@ -69,8 +69,8 @@ class TilePipeline {
   // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
   // level has no tile, the mesh of the deepest available tile of a lower level is read. `normals`: also normals. Keeps
   // meshes between calls. kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in
-  // tiles whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and its archive has no
-  // quantized-mesh tiles, or the surface is that of kGlb. Other errors: those of Build.
+  // tiles whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and either its archive has no
+  // quantized-mesh tiles or the surface is that of kGlb. Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;

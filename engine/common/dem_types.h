@@ -76,7 +76,8 @@ struct DemOptions {
   // GeoJSON files (docs/edits.md), in order. Later edits apply over earlier ones, but leave the holes that those cut.
   std::vector<std::string> edits = {};
   // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, a source is blended with the sources
-  // below. At most 256 of the samples, or averages of samples, that the level is read from. 0: hard edges.
+  // below. The distance is at most 256 times the spacing of the samples, or averages, that the level is read from. 0:
+  // hard edges.
   double feather = 0;
   // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
   // equal shares. The share falls if a raster has to be read again. May be empty.

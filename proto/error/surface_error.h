@@ -24,7 +24,8 @@ namespace terrace::proto {
 double MeasureSurfaceError(const TileSamples& samples, const QuantizedTile& tile,
                            const std::vector<geo::Vec3>& positions, double at_samples_m);
 
-// The same for flat triangles with their vertices at exact lattice positions, as in TileErrorMeter::MeasureFlat.
+// The same for flat triangles whose vertices, at `positions`, lie near lattice nodes, as in
+// TileErrorMeter::MeasureFlat.
 double MeasureFlatSurfaceError(const TileSamples& samples, const tin::TinMesh& mesh,
                                const std::vector<geo::Vec3>& positions, double at_samples_m);
 

@@ -58,16 +58,16 @@ bool IsOpen(Stream& stream) {
 }  // namespace
 
 asio::awaitable<void> ClientLeft(Stream& stream) {
-  asio::ip::tcp::socket& socket = stream.socket();
+  // Most calls are cancelled soon, and an exception would take some microseconds each time.
+  co_await asio::this_coro::throw_if_cancelled(false);
+  boost::system::error_code ended;  // cancelled; or the socket was closed here, so the client is gone
+  const auto awaitable = [&] { return asio::redirect_error(asio::use_awaitable, ended); };
   asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
-  co_await timer.async_wait(asio::use_awaitable);
-  // On an error the socket was closed here, so the client is gone.
-  boost::system::error_code closed;
-  co_await socket.async_wait(asio::ip::tcp::socket::wait_read, asio::redirect_error(asio::use_awaitable, closed));
-  if (closed) co_return;
-  while (IsOpen(stream)) {
+  co_await timer.async_wait(awaitable());
+  if (!ended) co_await stream.socket().async_wait(asio::ip::tcp::socket::wait_read, awaitable());
+  while (!ended && IsOpen(stream)) {
     timer.expires_after(kInterval);
-    co_await timer.async_wait(asio::use_awaitable);
+    co_await timer.async_wait(awaitable());
   }
 }
 

@@ -1,6 +1,6 @@
 // How the quantized-mesh and GLB tiles of a dataset are meshed. Meshes of areas do not use these options. Tiles in
-// which an edit cuts a hole, and tiles in which rounding turned a triangle over, are made with kDelaunay in any case;
-// the latter are not compacted.
+// which an edit cuts a hole are made with kDelaunay in any case. So are quantized-mesh tiles in which rounding turned a
+// triangle over; these are not compacted either.
 #pragma once
 
 #include "engine/tin/criterion.h"

@@ -45,9 +45,9 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::TileSamples& samples, 
 }
 
 // Makes a mesh within the format's limit of vertices. Inside the tile its error is `scale` times the requested one;
-// `scale`, a power of two, doubles until the mesh keeps the limit. Edges do not depend on the inside: they keep the
-// threshold of the requested error and its seeds exactly, because scaling by a power of two is exact. `error_m`: the
-// requested error; becomes the error that was reached inside.
+// `scale`, a power of two, doubles until the mesh keeps the limit. Edges and seeds stay those of the requested error:
+// their errors and thresholds are multiplied by `scale` too, which is exact. `error_m`: the requested error; becomes
+// the error that was reached inside.
 Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& unscaled, double scale,
                                         double& error_m, const std::stop_token& stop) {
   for (;; scale *= 2) {
