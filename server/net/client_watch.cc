@@ -58,8 +58,8 @@ bool IsOpen(Stream& stream) {
 }  // namespace
 
 asio::awaitable<void> ClientLeft(Stream& stream) {
-  // Most calls are cancelled soon, and an exception would take some microseconds each time.
-  co_await asio::this_coro::throw_if_cancelled(false);
+  // Most calls are cancelled while they wait, and an exception would take some microseconds each time. A call that is
+  // cancelled before it waits throws.
   boost::system::error_code ended;  // cancelled; or the socket was closed here, so the client is gone
   const auto awaitable = [&] { return asio::redirect_error(asio::use_awaitable, ended); };
   asio::steady_timer timer(co_await asio::this_coro::executor, kPatience);
