@@ -12,7 +12,7 @@ namespace terrace::geo {
 
 struct Lattice {
   int level = 0;
-  int cells = 256;  // per tile edge; of heights 256, 128, 64 or 32
+  int cells = 256;  // along a tile's edge: 256, 128, 64 or 32; for images the pixels of a tile
 
   // The number of samples around the Earth, and of cells from pole to pole.
   std::int64_t columns() const { return TileColumns(level) * cells; }

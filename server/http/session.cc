@@ -446,9 +446,9 @@ asio::awaitable<bool> Session::Reply(Response& response, bool is_answer) {
   co_return options.keep_alive&& asio::buffer_size(left) == 0;
 }
 
-// Writes `left`. It keeps what was not written: the client is gone, has read nothing for too long, or reads too slowly
-// on average. `total`: bytes of the reply that were written before. They count for min_rate. `room` does not count them
-// as taken by the client, because the kernel may only have buffered them.
+// Writes `left`. Bytes remain in it only if the client is gone, has read nothing for too long, or reads too slowly on
+// average. `total`: bytes of the reply that were written before. They count for min_rate. `room` does not count them as
+// taken by the client, because the kernel may only have buffered them.
 asio::awaitable<void> Session::WriteRest(BufferPair& left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
   room.BeginReply();

@@ -141,7 +141,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
                          const PoolJobPtr waiting = known.lock();
                          return waiting && waiting->terms.client == terms.client;
                        });
-  // Before another job of the flight can be dropped: Fail must see that this one may still build.
+  // Entered here, before the pool can drop another job of the flight: Fail must see that this one may still build.
   if (!has_job) flight->jobs.push_back(job);
   flight->waiters.push_back(waiter);
   if (!joined) flights_.emplace(key, flight);

@@ -87,9 +87,9 @@ std::vector<double> SquaredEastSteps(std::span<const double> latitudes, double s
   return east_m2;
 }
 
-// Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
-// error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
-// second.
+// Rounding changes the heights of an edge by up to half of the edge's height step. The height step is at most the
+// larger of an eighth of the error and what the edge needs at any error. BorderOptions::weight accounts for the first,
+// step_m for the second.
 tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& finest) {
   tin::GreedyOptions options;
   options.curvature = MakeCurvature(samples);

@@ -23,8 +23,8 @@ struct MeshedTile {
   std::vector<std::uint8_t> in_hole;  // by triangle, as TrianglesInHoles (edit_limits.h)
   proto::QuantizedTile tile;
   std::vector<geo::Vec3> positions;         // of its vertices, ECEF
-  double max_error_m = 0;                   // measured on the encoded integers
-  double surface_error_m = 0;               // also between the lattice's samples
+  double max_error_m = 0;                   // at the lattice's samples, measured on the encoded integers
+  double surface_error_m = 0;               // the same everywhere, not only at the samples
   std::chrono::microseconds replay_time{};  // of ReplayMesh
 };
 

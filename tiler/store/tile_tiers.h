@@ -1,6 +1,7 @@
 // The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order; the tier
 // that has it fills the tiers above. If none has it, it is built and goes into all of them. Stores may drop tiles.
-// Memory does not keep a tile that is larger than a 16th of it; below 64 MiB, than all of it.
+// Memory does not keep a tile that is larger than a 16th of `memory_bytes`. If `memory_bytes` is below 64 MiB, the
+// limit is all of it.
 //
 // Thread-safe. Look-ups of one key are not joined: two threads that ask for a tile at once may both build it.
 #pragma once
