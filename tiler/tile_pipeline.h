@@ -77,9 +77,10 @@ class TilePipeline {
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
   // ElevationModel::LookAlong. kInvalidArgument: the rays together are longer than 2 x 10^8 times the spacing of the
-  // dataset's finest source (without sources: a 256th of a tile's side, at most 500 m); over the sources' surface, a
-  // ray passes near an edit (ElevationModel::LookAlong); over a drawn one, the rays cross more than 64 tiles, or tiles
-  // whose meshes take more than 256 MiB. Other errors: those of ReadPoints and ReadDrawnPoints.
+  // dataset's finest source, or in a dataset without sources 2 x 10^8 times a 256th of the north-south side of a tile
+  // of the surface's level, at most 500 m; over the sources' surface, a ray passes near an edit
+  // (ElevationModel::LookAlong); over a drawn one, the rays cross more than 64 tiles, or tiles whose meshes take more
+  // than 256 MiB. Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

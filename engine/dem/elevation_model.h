@@ -42,8 +42,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
   // are opened as by Open, which may take long. Errors: those of Open. kCancelled also means that the cache lacks
-  // statistics of a file. If another file has an error as well, this error is returned; but if DemOptions::fault is
-  // set, fault gets the error, and kCancelled is returned.
+  // statistics of a file. If another file has an error of its own, that error is returned instead of kCancelled; but if
+  // DemOptions::fault is set, fault gets that error, and kCancelled is returned.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 

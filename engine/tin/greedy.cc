@@ -192,8 +192,8 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options,
     vertices.push_back(VertexOf(sample));
   }
   triangulation_ = Triangulation(std::move(vertices), mesh.triangles);
-  // Seeds start from the first grid: grids in the mesh are due at once, because they were due above the reached error,
-  // and all of their samples are vertices already.
+  // NextSeed starts again at the first grid. Grids that the mesh already has are due at once; their samples are
+  // skipped, because they are vertices.
   if (recorder_) recorder_.emplace(refinement);
   for (TriangleId t = 0; t < triangulation_.triangle_count(); ++t) AwaitScan(t);
 }

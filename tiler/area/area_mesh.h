@@ -47,10 +47,11 @@ Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fractio
 // Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
 // the flat triangles. Triangles in holes count, too, although the file does not have them. All triangles are flat in
 // the file's coordinates: in space, or for kGeographic in longitude, latitude and height. In space, positions of
-// vertices are rounded to 2^-10 m; for a sample that is a vertex, the distance from its rounded position counts if it
-// is smaller than the vertical one, as beside nearly upright triangles. Rounding to 32 bits in a GLB is not included.
-// Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a hole that
-// edits cut, or the mesh exceeds the limits of the file format. Other errors: those of ElevationModel::ReadNodes.
+// vertices are rounded to 2^-10 m. A sample that is a vertex counts with its distance from the rounded position if that
+// is smaller: beside a nearly upright triangle, a small shift makes the vertical distance large. Rounding to 32 bits in
+// a GLB is not included. Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area
+// lies in a hole that edits cut, or the mesh exceeds the limits of the file format. Other errors: those of
+// ElevationModel::ReadNodes.
 Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 
