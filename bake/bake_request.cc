@@ -199,7 +199,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.available = request.bbox ? TilesWithin(model.Availability(), *request.bbox) : model.Availability();
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
-      manifest.error_steps.push_back(tiler::ErrorStep(request.requested, level, dataset.error_scale()));
+      manifest.error_steps.push_back(geo::ErrorStep(request.requested, level, dataset.error_scale()));
     }
   }
   return manifests;

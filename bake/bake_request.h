@@ -9,8 +9,8 @@
 #include "archive/manifest.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "proto/media_type.h"
-#include "tiler/tile/requested_error.h"
+#include "engine/geo/error_ladder.h"
+#include "proto/tile_extensions.h"
 #include "tiler/tile/tile_request.h"
 #include "tiler/tile_pipeline.h"
 
@@ -20,7 +20,7 @@ struct BakeRequest {
   std::vector<tiler::TileFormat> formats = {tiler::TileFormat::kQuantizedMesh};
   std::optional<std::pair<int, int>> levels = {};  // first and last; nothing: all
   std::optional<dem::GeoBounds> bbox = {};         // tiles that overlap it, and their siblings; nothing: all
-  tiler::RequestedError requested = {};
+  geo::RequestedError requested = {};
   // Extensions of quantized-mesh. Nothing: normals, and the water mask where the dataset has one.
   std::optional<proto::TileExtensions> extensions = {};
   bool compress = true;  // with gzip, where that makes tiles smaller

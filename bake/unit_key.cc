@@ -37,7 +37,7 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
 void AddOptions(dem::ContentHasher& hasher, const tiler::Dataset& dataset, const tiler::TileRequest& kind) {
   // All members are named, so that a new one fails to compile until it is considered here.
   const auto& [name, attribution, error_fraction, mesh_options, glb, model, baked, baked_files, water, imagery,
-               metadata_availability, generation, unedited_generation, options_hash] = dataset;
+               metadata_availability, generation, unedited_generation] = dataset;
   hasher.Add(error_fraction);
   if (kind.format == tiler::TileFormat::kHeightPng) return;
   hasher.Add(static_cast<int>(mesh_options.criterion));

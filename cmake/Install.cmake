@@ -53,7 +53,7 @@ install(EXPORT terrace_targets NAMESPACE terrace:: FILE terraceTargets.cmake
 
 # The headers of docs/embedding.md.
 terrace_reached_headers(terrace_headers engine/dem/elevation_model.h engine/geo/error_ladder.h
-  engine/statistics/averages_budget.h engine/statistics/cache_folder.h tiler/store/tile_tiers.h tiler/tile_pipeline.h)
+  engine/common/averages_budget.h engine/statistics/cache_folder.h tiler/store/tile_tiers.h tiler/tile_pipeline.h)
 foreach(header IN LISTS terrace_headers)
   cmake_path(GET header PARENT_PATH folder)
   install(FILES "${PROJECT_SOURCE_DIR}/${header}" DESTINATION "include/terrace/${folder}"

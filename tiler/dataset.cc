@@ -25,7 +25,7 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 
 }  // namespace
 
-ErrorScale Dataset::error_scale() const {
+geo::ErrorScale Dataset::error_scale() const {
   if (model) return {error_fraction, model->max_source_level()};
   return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
 }

@@ -148,7 +148,7 @@ FindMesh MeshFinder(DrawnMeshCache& drawn, RefinementCache& refinements, const D
           &stop](const geo::TileKey& key) -> Result<std::shared_ptr<const DrawnMesh>> {
     TileRequest request;
     request.key = key;
-    request.error_step = ErrorStep(surface.requested, key.level, dataset.error_scale());
+    request.error_step = geo::ErrorStep(surface.requested, key.level, dataset.error_scale());
     request.format = surface.format;
     const bool is_glb = surface.format == TileFormat::kGlb;
     if (is_glb) request.compression = surface.compression.value_or(dataset.glb.compression);

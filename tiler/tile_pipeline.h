@@ -1,4 +1,4 @@
-// Makes what is served of datasets: tiles, heights and normals at points, lines of sight, meshes of areas. Blocking.
+// Makes what is served of datasets: tiles, heights and normals at points, lines of sight, meshes of areas.
 #pragma once
 
 #include <array>
@@ -24,19 +24,18 @@ namespace terrace::tiler {
 class DrawnMeshCache;
 class RefinementCache;
 
-// Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
-// that compute results are virtual, so that tests can replace them.
+// Thread-safe. Functions that read or build block. `dataset` is an index into datasets(). Functions that compute
+// results are virtual, so that tests can replace them.
 //
-// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. A refinement is the
-// record of a run of insertions. If a kept tile is requested in another format or coding, or with a larger error, its
-// mesh is taken from the record, and the tile is encoded. If it is requested with a smaller error, the run is
-// continued. Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of
-// ReadDrawnPoints and LookAlong take up to 32 MiB besides, and up to 256 MiB more during each call.
+// Heights and refinements of tiles are kept between builds, up to `refinement_cache_bytes`; 0: none. A refinement is
+// the record of a run of insertions. Another format, coding or larger error of a kept tile takes its mesh from the
+// record; a smaller error continues the run. The bytes of a tile do not depend on what is kept. ReadDrawnPoints and
+// LookAlong keep meshes besides, up to 32 MiB, and take up to 256 MiB more during a call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
-  // Uses a cache that other pipelines may share, and that may outlive this one (tiler/store/refinement_cache.h, which
+  // With a cache that other pipelines may share, and that may outlive this one (tiler/store/refinement_cache.h, which
   // is not installed). Not null.
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
@@ -44,49 +43,53 @@ class TilePipeline {
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
-  // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
-  // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset; an invalid key (geo::IsValid, or outside the Web Mercator grid); a quantized-mesh or
-  // GLB tile outside availability; heights, a hillshade, slopes or contours deeper than max_mercator_depth; imagery of
-  // a dataset without an image; in a dataset without sources, a tile that its archive lacks. kUnavailable: a source
-  // cannot be read now. kChanged: a file of a source, of the water mask or of the image was replaced, so the dataset
-  // has to be opened again. kInvalidArgument: `error_step`, `side_px` or a member of `map` that the format uses is out
-  // of its range. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Without sources, takes it from the
+  // archive. Errors:
+  // - kNotFound: there is no such dataset; a key outside the tiling scheme of the format; a quantized-mesh or GLB tile
+  //   that is not available; heights, a hillshade, slopes or contours deeper than DemInfo::max_mercator_depth; imagery
+  //   without an image; without sources, a tile that the archive lacks.
+  // - kInvalidArgument: `error_step`, `side_px` or a member of `map` that the format uses is out of its range.
+  // - kUnavailable: a source cannot be read now.
+  // - kChanged: a file of a source, of the water mask or of the image was replaced, so the dataset has to be opened
+  //   again.
+  // - kInternal: an encoder failed.
+  // - kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // As ElevationModel::ReadPoints. Its preconditions hold for the points of all functions below. kNotFound, here and in
-  // ReadNormals, PlanArea and BuildArea: there is no such dataset, or it has no sources.
+  // As ElevationModel::ReadPoints, whose preconditions hold for the points of all functions below. kNotFound, here and
+  // in ReadNormals, PlanArea and BuildArea: there is no such dataset, or it has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
-  // The normals of the surface of ReadPoints, edits included: unit vectors east, north, up. Slopes are computed from
-  // the heights at half the finest source's spacing on each side of the point. NaN where the point has no height, or
-  // where on one axis both places beside it have none. Errors: those of ReadPoints.
+  // The normals of the surface of ReadPoints: unit vectors east, north, up. Slopes are those between the heights at
+  // half the finest source's spacing on both sides of the point. NaN where the point has no height, or where both
+  // places on one axis have none. Errors: those of ReadPoints.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
-  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
-  // level has no tile, the mesh of the deepest available tile of a lower level is read. `normals`: also normals. Keeps
-  // meshes between calls. kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in
-  // tiles whose meshes take more than 256 MiB. kNotFound: the dataset has no sources, and either its archive has no
-  // quantized-mesh tiles or the surface is that of kGlb. Other errors: those of Build.
+  // Heights, and with `normals` also normals, of the meshes that clients decode. NaN in holes that edits cut. Where the
+  // level has no tile, the mesh of the deepest available tile of a lower level is read. Errors:
+  // - kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in tiles whose meshes
+  //   take more than 256 MiB.
+  // - kNotFound: there is no such dataset; without sources: a surface of kGlb, or an archive without quantized-mesh
+  // tiles.
+  // - Others: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
 
-  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
-  // ElevationModel::LookAlong. kInvalidArgument: the rays together are longer than 2 x 10^8 times the spacing of the
-  // dataset's finest source, or in a dataset without sources 2 x 10^8 times a 256th of the north-south side of a tile
-  // of the surface's level, at most 500 m; over the sources' surface, a ray passes near an edit
-  // (ElevationModel::LookAlong); over a drawn one, the rays cross more than 64 tiles, or tiles whose meshes take more
-  // than 256 MiB. Other errors: those of ReadPoints and ReadDrawnPoints.
+  // Lines of sight over the sources' surface (no `surface`: ElevationModel::LookAlong) or over a drawn one; one answer
+  // for each ray. Preconditions: those of ElevationModel::LookAlong. Errors: those of ElevationModel::LookAlong,
+  // ReadPoints and ReadDrawnPoints; kInvalidArgument: all rays together are longer than 2 x 10^8 steps. A step is the
+  // finest source's spacing; without sources a 256th of the north-south side of a tile of the surface's level, at most
+  // 500 m.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,
                                                           const dem::SightOptions& options, std::stop_token stop) const;
 
-  // PlanArea reads nothing and returns at once; BuildArea blocks (area_mesh.h).
+  // As PlanArea and BuildAreaMesh of area_mesh.h. PlanArea reads nothing and returns at once.
   virtual Result<AreaPlan> PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const;
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;

@@ -36,11 +36,11 @@ DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/st
        "engine/bound", "engine/edits", "engine/image", "engine/export"]
 # Rows (name, folder, headers): a module that may include the module `name` may also include these headers of the modules in `folder`.
 PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
-    ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/dem_types.h", "common/idle_pool.h", "common/lru_block_cache.h", "common/parallel_for.h", "crs/geodesic_path.h", "edits/edit_effects.h",
-                              "export/contour_lines.h", "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
+    ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/averages_budget.h", "common/dem_types.h", "common/file_stamp.h", "common/idle_pool.h", "common/lru_block_cache.h", "common/parallel_for.h", "crs/geodesic_path.h", "edits/edit_effects.h",
+                              "export/contour_lines.h", "export/output_grid.h", "gdal/file_content.h", "gdal/stamped_files.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
                               "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sight/quadratic.h",
-                              "sight/ray_course.h", "sight/sight_ray.h",
-                              "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h")),
+                              "sight/ray_course.h", "sight/sight_ray.h", "sight/sight_search.h",
+                              "sources/read_raster.h", "statistics/cache_folder.h")),
     ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/token_hash.h",
                           "common/working_directory.h", "options/options.h")),
 ) for name in names}

@@ -19,9 +19,9 @@ namespace terrace::dem {
 
 // How to interpret the samples of a source.
 struct SourceOptions {
-  // The vertical datum: "crs" (as the file states it; if it states none, as "unknown"), "unknown" (heights are used
-  // unchanged, with a warning), "ellipsoid", "egm96", "egm2008", the EPSG code of a vertical reference system
-  // ("EPSG:5703"), or the path of a geoid grid.
+  // The vertical datum. "crs": as the file states it; if it states none, as "unknown". "unknown": heights are used
+  // unchanged, with a warning. Others: "ellipsoid", "egm96", "egm2008", the EPSG code of a vertical reference system
+  // ("EPSG:5703"), the path of a geoid grid.
   std::string vertical = "crs";
   bool find_voids = true;           // detects undeclared nodata values
   std::vector<double> nodata = {};  // further raw values that mean void
@@ -29,79 +29,81 @@ struct SourceOptions {
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
 };
 
-// The surface in a hole. Voids that are narrower than DemOptions::max_void_gap are filled from their edges. Among the
-// others, a hole has data all around it and no height from any source. Those that touch a place without a raster are
-// collars; where no source has a height, they always show the floor (docs/decisions/0015-voids.md).
+// Voids narrower than DemOptions::max_void_gap are filled from their edges. Wider voids are of two kinds: holes have
+// data all around them, collars touch a place without a raster. Where no source has a height, a collar has the floor,
+// and a hole has this surface (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
-  // A harmonic surface between the surrounding heights. If the voids of a raster are too ragged to tell holes from
-  // collars, all of them are treated as collars, and RasterInfo::warnings says so.
+  // A harmonic surface between the surrounding heights. If a raster's voids are too ragged to tell holes from collars,
+  // all are collars, and RasterInfo::warnings says so.
   kSmooth,
   kFloor,
 };
 
-// The vertical datum of the heights that a read returns. Heights that edits set in another datum are converted, which
-// may change them by millimetres (docs/edits.md).
+// The vertical datum of the heights that a read returns. A conversion may change heights that edits set by millimetres
+// (docs/edits.md).
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  // The source's own. The floor is returned in the datum of the source of lowest precedence that has a geoid; above
-  // the ellipsoid if none has one.
+  // The source's own. The floor is in the datum of the last source, in order of precedence, that has a geoid; without
+  // such a source above the ellipsoid.
   kSource,
 };
 
 class AveragesBudget;
 class CacheFolder;
 
-// The storage of statistics of rasters, and of averages of blocks of samples, from which tiles of low levels are read.
-// With a folder, later calls of Open do not read a raster completely if its files have not changed and the folder still
-// has its statistics.
+// Where models keep statistics of rasters, and averages of blocks of samples, from which tiles of low levels are read.
+// With a folder, later calls of Open need not read all samples of a raster again.
 struct RasterCache {
-  std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
-  // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
-  std::shared_ptr<AveragesBudget> memory = {};
+  std::shared_ptr<CacheFolder> folder = {};     // null: none
+  std::shared_ptr<AveragesBudget> memory = {};  // for averages that the folder does not keep; null: none
 };
 
 struct DemOptions {
   SourceOptions source = {};    // for files without options of their own, and for the rasters of edits
-  double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume; > 0
-  // Metres, > 0: the deepest level is the first whose default error is at most this, but at most geo::kMaxLevel.
+  double error_fraction = 0.5;  // > 0: ratio of a level's default error to geo::LevelError
+  // Metres, > 0: the deepest level is the first whose default error is at most this (ElevationModel::max_level).
   std::optional<double> finest_error = {};
-  // Metres above the ellipsoid, -99,998 .. 99,998; used outside the sources, in collars, and with HoleFill::kFloor in
-  // holes. Default: DemInfo::heights.min as it is without edits.
+  // Metres above the ellipsoid, -99,998 .. 99,998: the height where there is no other, which is outside the sources, in
+  // collars, and in holes with HoleFill::kFloor. Default: the smallest height of the sources.
   std::optional<double> floor = {};
-  HoleFill holes = HoleFill::kSmooth;  // other voids follow `max_void_gap` and `floor`
-  // Samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled.
-  int max_void_gap = 64;
+  HoleFill holes = HoleFill::kSmooth;
+  int max_void_gap = 64;  // samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
   // GeoJSON files (docs/edits.md), in order. Later edits apply over earlier ones, but leave the holes that those cut.
   std::vector<std::string> edits = {};
-  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids, a source is blended with the sources
-  // below. The distance is at most 256 times the spacing of the samples, or averages, that the level is read from. 0:
-  // hard edges.
+  // Metres, 0 .. 10^6; 0: none. Within this distance of its edges and voids, a source is blended with the next sources
+  // in order of precedence. At most 256 times the spacing of the samples or averages that the level is read from.
   double feather = 0;
-  // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
-  // equal shares. The share falls if a raster has to be read again. May be empty.
+  // Called by Open on its threads, one call at a time, with the share done, 0 .. 1. All files have equal shares. The
+  // share falls if a raster has to be read again.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // makes Open return kCancelled
-  // Called on the thread of Open for every file of the list that cannot be opened; Open checks all files before it
-  // returns the first of these errors. Empty: Open fails at the first.
+  // Called on the thread of Open for each file that cannot be opened. Open then goes on with the other files, and
+  // returns the first of these errors at the end. Empty: Open ends at the first error.
   std::function<void(const Error&)> fault = {};
+};
+
+// How the bytes of files are hashed (file_content.h).
+struct FileContentOptions {
+  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
+  std::stop_token stop = {};
 };
 
 // One raster of a dataset.
 struct DemFile {
   std::string path;
-  // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
-  // 2^(1/16)), then the path that sorts first. Files of one rank and one vertical datum that touch on one pixel grid
-  // are one source, with the path of the first of them. The order of the list has no effect.
+  // Order of precedence: the lowest rank, then the finer source (spacings are rounded to powers of 2^(1/16)), then the
+  // path that sorts first. Files of one rank and one vertical datum that touch on one pixel grid are one source, with
+  // the path of the first of them. The order of the list has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres above the ellipsoid, unless the member names another datum. Heights of a source with an unknown vertical datum
-// are as the source has them. Also used for undulations.
+// Metres above the ellipsoid, unless the member says otherwise. Heights of a source with an unknown vertical datum are
+// as the source has them.
 struct HeightRange {
   double min = 0;
   double max = 0;
@@ -114,10 +116,10 @@ struct GeoPosition {
   double longitude = 0, latitude = 0;
 };
 
-// A rectangle of nodes of a lattice, with rows counted northwards, or of pixels of a Web Mercator grid, with rows
-// counted southwards: its first column and row, and how many of each.
+// A rectangle of nodes of a lattice, whose rows count northwards, or of pixels of a Web Mercator grid, whose rows count
+// southwards.
 struct NodeWindow {
-  std::int64_t column = 0, row = 0;
+  std::int64_t column = 0, row = 0;  // the first
   int columns = 0, rows = 0;
 };
 
@@ -194,12 +196,12 @@ struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };
 
-// How many samples were read for nodes and pixels. A sample of an overview, or a stored average, counts as one. Voids
-// that are known from statistics count too, although they are not read.
+// How many samples were read for nodes and pixels. A sample of an overview, or an average, counts as one. Voids count
+// also where statistics say that there are only voids, which are not read.
 struct SampleCounts {
   std::uint64_t measured = 0;
   std::uint64_t filled = 0;  // voids filled from the heights around them
-  std::uint64_t voids = 0;   // left to other sources or the floor
+  std::uint64_t voids = 0;   // not filled
 };
 
 // Height samples of a tile and a halo of one sample on each side, row by row from the south-western halo sample. All
@@ -208,10 +210,9 @@ struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
-  // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
-  // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
-  // it bounds the distance from the blended heights as well. Where edits apply, the distance is to the samples after
-  // these edits. Infinite: no bound is known.
+  // Metres: an upper bound of the vertical distance between two things: the surface that is bilinear between the tile's
+  // samples without the halo, and every valid sample of the sources at full resolution, after the edits that apply to
+  // it. Where sources are blended, it also holds for the blended heights. Infinite: no bound is known.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

@@ -1,9 +1,8 @@
 // Result<T>: a value, or an Error that says what went wrong, where, and what would be right.
 //
 // Functions return foreseeable failures (input, disk, network, load) as Result. TERRACE_CHECK aborts on programming
-// errors. Exceptions of third-party libraries are caught where they are called and returned as Error. Functions that
-// read, build or encode, and ElevationModel::RangeBound, may throw two exceptions: std::bad_alloc; and ThrownError, if
-// statistics of a source that are not kept in memory can neither be read from the cache folder nor computed again.
+// errors. Exceptions of third-party libraries are caught where they are called, and returned as Error. Functions that
+// read, build or encode, and ElevationModel::RangeBound, may throw std::bad_alloc and ThrownError.
 #pragma once
 
 #include <fmt/core.h>
@@ -38,7 +37,7 @@ struct Error {
   std::string message;
 };
 
-// An Error as an exception.
+// An Error as an exception: statistics of a source can neither be read from the cache folder nor be computed again.
 class ThrownError : public std::exception {
  public:
   explicit ThrownError(Error error) : error_(std::move(error)) {}

@@ -15,6 +15,7 @@
 #include "engine/crs/projector.h"
 #include "engine/crs/undulation_grid.h"
 #include "engine/gdal/file_content.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/geo/geo_bounds.h"
 
 namespace terrace::dem {

@@ -9,7 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/crs/operation_pool.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 
 namespace terrace::dem {
 

@@ -18,6 +18,7 @@
 #include "engine/edits/edit_error_bound.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/read_edits.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/geo/mercator_grid.h"
 #include "engine/raster/grid_cells.h"
 

@@ -14,6 +14,7 @@
 
 #include "engine/dem/elevation_model.h"
 #include "engine/edits/edit_set.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/geo/node_grid.h"
 #include "engine/mosaic/raster_grid.h"
 

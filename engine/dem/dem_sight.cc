@@ -6,6 +6,7 @@
 
 #include "engine/dem/dem_impl.h"
 #include "engine/sight/grid_sight.h"
+#include "engine/sight/sight_search.h"
 
 namespace terrace::dem {
 namespace {

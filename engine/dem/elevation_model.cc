@@ -16,6 +16,7 @@
 #include "engine/crs/footprint.h"
 #include "engine/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/geo/octave.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/mosaic/availability.h"

@@ -2,8 +2,9 @@
 #pragma once
 
 #include "engine/common/content_hash.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 
 namespace terrace::dem {
 

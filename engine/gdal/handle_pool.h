@@ -11,7 +11,7 @@
 
 #include "engine/common/idle_pool.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 
 namespace terrace::dem {
 

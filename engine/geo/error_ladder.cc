@@ -1,7 +1,9 @@
 #include "engine/geo/error_ladder.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "engine/core/check.h"
@@ -35,6 +37,22 @@ int SnapToLadder(int level, double error_m, double error_fraction) {
     if (LadderError(level, step, error_fraction) <= error_m * (1 + 1e-9)) return step;
   }
   return kFinestStep;
+}
+
+int ErrorStep(const RequestedError& requested, int level, const ErrorScale& scale) {
+  if (requested.fraction) {
+    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
+    const double error_m = std::clamp(*requested.fraction * LevelError(level), std::numeric_limits<double>::min(),
+                                      std::numeric_limits<double>::max());
+    return SnapToLadder(level, error_m, scale.fraction);
+  }
+  if (!requested.error_m) {
+    const auto at = static_cast<std::size_t>(level);
+    return at < scale.default_steps.size() ? scale.default_steps[at] : 0;
+  }
+  const int step = SnapToLadder(level, *requested.error_m, scale.fraction);
+  // max(error, default): steps above 0 are finer than the default.
+  return requested.at_least && level < scale.max_source_level ? std::min(step, 0) : step;
 }
 
 }  // namespace terrace::geo

@@ -8,7 +8,7 @@
 
 #include "engine/common/idle_pool.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/image/image_file.h"
 
 namespace terrace::dem {

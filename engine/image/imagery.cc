@@ -13,6 +13,7 @@
 #include "engine/crs/level_plan.h"
 #include "engine/crs/node_positions.h"
 #include "engine/gdal/raster_file.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/geo/mercator_grid.h"
 #include "engine/image/image_bins.h"
 #include "engine/image/image_pool.h"

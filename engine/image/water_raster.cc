@@ -13,6 +13,7 @@
 #include "engine/gdal/handle_pool.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/sample_rules.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/raster_layout.h"
 #include "engine/sources/located_raster.h"

@@ -1,5 +1,4 @@
-// A water mask: a raster whose samples are not zero on water.
-// Immutable after Open and thread-safe. No GDAL type appears in this header.
+// A water mask: a raster whose samples are not zero on water. Does not change after Open. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -10,34 +9,36 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {
+
+class StampedFiles;  // engine/gdal/stamped_files.h, which is not installed
 
 class WaterRaster {
  public:
   static constexpr int kSide = 256;  // pixels along a tile's edge
 
-  // Opens band 1 of a georeferenced raster. `around`: the bounds of the dataset (DemInfo::bounds). `path` is resolved
-  // at each use. `content`: where hashes of large files are stored, and the token that stops Open. kNotFound: there is
-  // no such file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference, or a raster outside
-  // `around`. kChanged: a file was replaced meanwhile. kUnavailable: it cannot be read. kCancelled: stopped.
+  // Opens band 1 of a georeferenced raster. Parameters and errors: those of Imagery::Open, except that all bands and
+  // samples are accepted.
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();
 
-  // Returns kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 is land, 255 water, and values in
-  // between are the share of water in a pixel on the coast. Pixels outside the raster or without data are land. A pixel
-  // depends only on its level and global position. Each sample counts as 1 (water) if it is not zero, else as 0. If the
-  // raster is finer than the pixels, these values are averaged. If it is coarser, they are interpolated, and the coast
-  // is the line at one half, as sharp as the pixels allow. Overviews are used, if they have the mask of the raster.
-  // Make them with `gdaladdo -r nearest` or `-r mode`: other methods give samples along the coast that are not zero,
-  // and these count as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kChanged: a file
-  // was replaced. kCancelled: stopped.
+  // Returns kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 is land, 255 is water, and a value
+  // in between is the share of water in a pixel on the coast. Pixels outside the raster or without data are land. A
+  // pixel depends only on its level and global position.
+  //
+  // A sample counts as 1 (water) if it is not zero, else as 0. If the raster is finer than the pixels, these values are
+  // averaged. If it is coarser, they are interpolated; the coast is the line at one half, as sharp as the pixels allow.
+  // Overviews are read if they have the mask of the raster. Make them with `gdaladdo -r nearest` or `-r mode`: other
+  // methods make samples along the coast that are not zero, and would count as water.
+  //
+  // Precondition: a valid key. kUnavailable: the raster cannot be read now. kChanged: a file was replaced. kCancelled:
+  // `stop` was requested.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
-  // A hash of the bytes of its files and of their georeference. Copies have the same hash.
+  // A hash of the bytes and the georeference of its files. Copies have the same hash.
   std::uint64_t fingerprint() const;
 
   // The files of the raster with their stamps at Open.

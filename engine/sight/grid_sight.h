@@ -15,6 +15,7 @@
 #include "engine/core/result.h"
 #include "engine/sight/sight_block.h"
 #include "engine/sight/sight_ray.h"
+#include "engine/sight/sight_search.h"
 #include "engine/sight/sight_track.h"
 
 namespace terrace::dem {

@@ -1,7 +1,6 @@
 // Lines of sight: rays, and what is known of them.
 #pragma once
 
-#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -13,7 +12,7 @@ struct SightPoint {
   double height_m = 0;
 };
 
-// A straight line in space, or nearly straight where the air bends it.
+// Straight in space; with refraction nearly straight.
 struct SightRay {
   SightPoint from, to;
 };
@@ -25,40 +24,20 @@ struct SightOptions {
 
 struct SightAnswer {
   bool is_visible = true;  // no part of the ray is more than kSightTolerance below the surface
-  // The smallest vertical distance from the surface up to the ray, its ends included; negative if the ray passes below.
-  // NaN: there is no surface anywhere along the ray.
+  // The smallest height of the ray above the surface, over the whole ray with its ends; negative if the ray passes
+  // below the surface. NaN: there is no surface anywhere along the ray.
   double clearance_m = std::numeric_limits<double>::quiet_NaN();
-  double clearance_at = 0;  // as a share of the ray's length
-  // The first place more than kSightTolerance below the surface, as a share of the ray's length.
+  double clearance_at = 0;  // where it is smallest, as a share of the ray's length
+  // The first place where the ray is more than kSightTolerance below the surface, as a share of its length.
   std::optional<double> blocked_at;
   bool has_gaps = false;  // parts of the ray are above places without a height
 };
 
-// Metres. A ray that touches the ground, as from a point that was read from the same surface, is not blocked.
+// Metres. A ray from a point that was read from the same surface is not blocked by that point.
 inline constexpr double kSightTolerance = 1e-3;
-// Metres. The longest ray that ElevationModel::LookAlong accepts: a precondition, which is not checked. Points near the
-// ground that are farther apart never see each other.
+// Metres: the longest ray of ElevationModel::LookAlong, which does not check it. Points near the ground that are
+// farther apart never see each other.
 inline constexpr double kMaxSightLength = 3e6;
-
-// What is known of a ray so far. Used by this library only.
-class SightSearch {
- public:
-  // Whether a part of the ray that begins at `start` and has at least this clearance can be skipped.
-  bool IsSettled(double clearance_m, double start) const {
-    return clearance_m >= clearance_m_ && (clearance_m >= -kSightTolerance || start >= blocked_at_);
-  }
-  // A clearance of the ray at a share of its length.
-  void Add(double clearance_m, double at) {
-    if (clearance_m < clearance_m_) clearance_m_ = clearance_m, clearance_at_ = at;
-  }
-  void AddBlocked(double at) { blocked_at_ = std::min(blocked_at_, at); }
-  bool IsBlockedBefore(double at) const { return blocked_at_ <= at; }
-  SightAnswer Answer(bool has_gaps) const;
-
- private:
-  static constexpr double kNone = std::numeric_limits<double>::infinity();
-  double clearance_m_ = kNone, clearance_at_ = 0, blocked_at_ = kNone;
-};
 
 // Metres, along the chord.
 double LengthOf(const SightRay& ray);

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "engine/common/file_stamp.h"
 #include "engine/core/result.h"
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 
 namespace terrace::dem {
 

@@ -64,7 +64,7 @@ class Preparer {
     if (options.cache.folder) {
       cache_file_ = StatisticsPath(options.cache.folder->path(), path, layout.rules.extra_nodata, options.find_voids,
                                    !layout.overview_factors.empty(), layout.rules.metres_per_unit);
-      prepared_.use = std::make_shared<const CacheFolder::Use>(options.cache.folder, cache_file_);
+      prepared_.use = std::make_shared<const CacheFileUse>(options.cache.folder, cache_file_);
     }
     prepared_.preparation.chunks = chunks_.count();
   }

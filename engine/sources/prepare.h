@@ -11,8 +11,8 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
-#include "engine/statistics/cache_folder.h"
+#include "engine/gdal/stamped_files.h"
+#include "engine/statistics/cache_files.h"
 #include "engine/statistics/memory_averages.h"
 #include "engine/statistics/raster_statistics.h"
 #include "engine/statistics/statistics_cache.h"
@@ -42,7 +42,7 @@ struct PreparedRaster {
   std::shared_ptr<const CachedAverages> averages;         // null: none
   std::shared_ptr<const MemoryAverages> memory_averages;  // if the file is not stored; null: none
   std::string cache_file;                                 // empty: not stored
-  std::shared_ptr<const CacheFolder::Use> use;            // of the cache file, stored or not; null: no cache folder
+  std::shared_ptr<const CacheFileUse> use;                // of the cache file, stored or not; null: no cache folder
   StatisticsKey key;                                      // of the cache file
   Preparation preparation;
 };

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/common/averages_budget.h"
 #include "engine/common/dem_types.h"
 #include "engine/common/lru_block_cache.h"
 #include "engine/core/result.h"
@@ -20,9 +21,10 @@
 #include "engine/crs/level_plan.h"
 #include "engine/crs/vertical_datum.h"
 #include "engine/gdal/handle_pool.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/raster/raster_layout.h"
 #include "engine/sources/prepare.h"
-#include "engine/statistics/averages_budget.h"
+#include "engine/statistics/cache_files.h"
 #include "engine/statistics/raster_statistics.h"
 
 namespace terrace::dem {
@@ -129,7 +131,7 @@ class RasterSource {
   std::unique_ptr<const Paging> paging_;
   std::shared_ptr<const CachedAverages> averages_;         // null: none
   std::shared_ptr<const MemoryAverages> memory_averages_;  // null: none
-  std::shared_ptr<const CacheFolder::Use> use_;            // of the cache file; null: no cache folder
+  std::shared_ptr<const CacheFileUse> use_;                // of the cache file; null: no cache folder
   mutable std::atomic<bool> has_lost_cache_{false};
   Preparation preparation_;
   RasterInfo info_;

@@ -1,5 +1,3 @@
-#include "engine/statistics/cache_folder.h"
-
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
@@ -8,11 +6,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
 
 #include "engine/common/open_file.h"
+#include "engine/statistics/cache_files.h"
 
 namespace terrace::dem {
 namespace {
@@ -21,9 +21,9 @@ constexpr std::size_t kHashDigits = 16;
 
 // "alps.tif-0123456789abcdef.statistics", also of a name with ".partial" behind it. Empty: another file's name.
 std::string FinishedName(std::string name) {
-  if (name.ends_with(CacheFolder::kPartial)) name.resize(name.size() - CacheFolder::kPartial.size());
-  const std::size_t tail = 1 + kHashDigits + CacheFolder::kEnding.size();
-  if (!name.ends_with(CacheFolder::kEnding) || name.size() <= tail) return {};
+  if (name.ends_with(CacheFolder::Files::kPartial)) name.resize(name.size() - CacheFolder::Files::kPartial.size());
+  const std::size_t tail = 1 + kHashDigits + CacheFolder::Files::kEnding.size();
+  if (!name.ends_with(CacheFolder::Files::kEnding) || name.size() <= tail) return {};
   const std::string_view hash = std::string_view(name).substr(name.size() - tail, 1 + kHashDigits);
   const auto is_digit = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
   return hash.front() == '-' && std::ranges::all_of(hash.substr(1), is_digit) ? name : std::string();
@@ -34,53 +34,49 @@ std::optional<FileStamp> LookAt(const std::string& path) {
   const OpenFile file(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   const std::optional<FileStamp> stamp = StampOf(file.get());
   std::uint64_t magic = 0;
-  const bool is_ours = stamp && ReadAt(file.get(), 0, &magic, sizeof magic) && magic == CacheFolder::kMagic;
+  const bool is_ours = stamp && ReadAt(file.get(), 0, &magic, sizeof magic) && magic == CacheFolder::Files::kMagic;
   return is_ours ? stamp : std::nullopt;
 }
 
 }  // namespace
 
-CacheFolder::CacheFolder(std::string path, std::uint64_t max_bytes) : path_(std::move(path)), max_bytes_(max_bytes) {}
-
-CacheFolder::~CacheFolder() = default;
-
-CacheFolder::Use::Use(std::shared_ptr<CacheFolder> folder, const std::string& file)
-    : folder_(std::move(folder)), name_(std::filesystem::path(file).filename().string()) {
-  const std::lock_guard lock(folder_->mutex_);
-  folder_->in_use_.insert(name_);
+CacheFileUse::CacheFileUse(std::shared_ptr<CacheFolder> folder, const std::string& file)
+    : folder_(std::move(folder)), files_(folder_->files()), name_(std::filesystem::path(file).filename().string()) {
+  const std::lock_guard lock(files_.mutex_);
+  files_.in_use_.insert(name_);
 }
 
-CacheFolder::Use::~Use() {
-  const std::lock_guard lock(folder_->mutex_);
-  folder_->in_use_.erase(folder_->in_use_.find(name_));
-  folder_->problems_.erase(this);
+CacheFileUse::~CacheFileUse() {
+  const std::lock_guard lock(files_.mutex_);
+  files_.in_use_.erase(files_.in_use_.find(name_));
+  files_.problems_.erase(this);
 }
 
-void CacheFolder::Use::Fail(const std::string& reason) const {
-  const std::lock_guard lock(folder_->mutex_);
-  const bool is_first = folder_->problems_.empty();
-  folder_->problems_[this] = reason;
+void CacheFileUse::Fail(const std::string& reason) const {
+  const std::lock_guard lock(files_.mutex_);
+  const bool is_first = files_.problems_.empty();
+  files_.problems_[this] = reason;
   if (is_first) {
-    spdlog::warn("cache_dir {}: {}: {}; averages of such sources are kept in memory as far as they fit", folder_->path_,
+    spdlog::warn("cache_dir {}: {}: {}; averages of such sources are kept in memory as far as they fit", files_.path_,
                  name_, reason);
   }
 }
 
-void CacheFolder::Use::Succeed() const {
-  const std::lock_guard lock(folder_->mutex_);
-  if (folder_->problems_.erase(this) > 0 && folder_->problems_.empty()) {
-    spdlog::info("cache_dir {}: all sources are kept there again", folder_->path_);
+void CacheFileUse::Succeed() const {
+  const std::lock_guard lock(files_.mutex_);
+  if (files_.problems_.erase(this) > 0 && files_.problems_.empty()) {
+    spdlog::info("cache_dir {}: all sources are kept there again", files_.path_);
   }
 }
 
-std::string CacheFolder::problem() const {
+std::string CacheFolder::Files::problem() const {
   const std::lock_guard lock(mutex_);
   return problems_.empty() ? std::string() : problems_.begin()->second;
 }
 
-bool CacheFolder::IsInUse(const std::string& name) const { return in_use_.contains(FinishedName(name)); }
+bool CacheFolder::Files::IsInUse(const std::string& name) const { return in_use_.contains(FinishedName(name)); }
 
-void CacheFolder::Scan() {
+void CacheFolder::Files::Scan() {
   bytes_ = since_scan_ = 0;
   scanned_at_ = std::chrono::steady_clock::now();
   oldest_first_.clear();
@@ -97,7 +93,7 @@ void CacheFolder::Scan() {
 
 // Removes the oldest files until they had at least `bytes` bytes. Keeps files that another process has used, replaced
 // or is writing.
-void CacheFolder::Evict(std::uint64_t bytes) {
+void CacheFolder::Files::Evict(std::uint64_t bytes) {
   std::uint64_t gone = 0;
   while (gone < bytes && !oldest_first_.empty()) {
     const File file = std::move(oldest_first_.extract(oldest_first_.begin()).mapped());
@@ -114,7 +110,7 @@ void CacheFolder::Evict(std::uint64_t bytes) {
 
 // Several processes write between their scans. Each scans before it has written a 16th of the budget, and keeps an
 // eighth of it free. So two of them do not exceed it.
-Result<void> CacheFolder::Reserve(std::uint64_t bytes) {
+Result<void> CacheFolder::Files::Reserve(std::uint64_t bytes) {
   if (max_bytes_ == kUnbounded) return {};
   const std::lock_guard lock(mutex_);
   // If the folder is full of files in use, tens of thousands of them are not examined again for each new file.
@@ -135,12 +131,12 @@ Result<void> CacheFolder::Reserve(std::uint64_t bytes) {
   return {};
 }
 
-void CacheFolder::Release(std::uint64_t bytes) {
+void CacheFolder::Files::Release(std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   bytes_ -= std::min(bytes_, bytes);
 }
 
-void CacheFolder::Trim() {
+void CacheFolder::Files::Trim() {
   if (max_bytes_ == kUnbounded) return;
   const std::lock_guard lock(mutex_);
   Scan();
@@ -151,5 +147,14 @@ void CacheFolder::Trim() {
                  bytes_, max_bytes_);
   }
 }
+
+CacheFolder::CacheFolder(std::string path, std::uint64_t max_bytes)
+    : files_(std::make_unique<Files>(std::move(path), max_bytes)) {}
+
+CacheFolder::~CacheFolder() = default;
+
+const std::string& CacheFolder::path() const { return files_->path(); }
+void CacheFolder::Trim() { files_->Trim(); }
+std::string CacheFolder::problem() const { return files_->problem(); }
 
 }  // namespace terrace::dem

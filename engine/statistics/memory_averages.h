@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "engine/statistics/averages_budget.h"
+#include "engine/common/averages_budget.h"
 #include "engine/statistics/raster_chunk.h"
 #include "engine/statistics/raster_statistics.h"
 

@@ -38,7 +38,7 @@ std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), 
 std::string HeaderOf(const StatisticsKey& key) {
   const std::string detected = EncodeDetectedNodata(key.detected);
   ByteWriter writer;
-  writer.Put(CacheFolder::kMagic);
+  writer.Put(CacheFolder::Files::kMagic);
   writer.Put(kCacheVersion);
   writer.Put(static_cast<std::uint32_t>(key.kept_factors()));
   writer.Put(key.hash);
@@ -61,7 +61,7 @@ HeaderState ReadHeader(int file, StatisticsKey& key, std::uint64_t& bytes) {
   ByteReader reader(std::string_view(*front).substr(kHeaderBytes - sizeof(std::uint32_t)));
   bytes = kHeaderBytes + std::uint64_t{reader.Get<std::uint32_t>()} + sizeof(std::uint64_t);
   const auto header = bytes > kMaxHeaderBytes ? std::nullopt : ReadAt(file, 0, bytes, size);
-  if (!header || ByteReader(*header).Get<std::uint64_t>() != CacheFolder::kMagic) return HeaderState::kDamaged;
+  if (!header || ByteReader(*header).Get<std::uint64_t>() != CacheFolder::Files::kMagic) return HeaderState::kDamaged;
   const std::string_view checked = std::string_view(*header).substr(0, bytes - sizeof(std::uint64_t));
   if (HashOf(checked) != ByteReader(std::string_view(*header).substr(checked.size())).Get<std::uint64_t>()) {
     return HeaderState::kDamaged;
@@ -244,7 +244,7 @@ Result<void> StatisticsCacheWriter::Restart(const DetectedNodata& detected) {
   layout_ = key_.EffectiveLayout();
   offsets_.clear();
   end_ = 0;
-  folder_->Release(std::exchange(reserved_, 0));
+  folder_->files().Release(std::exchange(reserved_, 0));
   if (auto cut = Cut(); !cut) return cut;
   return Write(HeaderOf(key_));
 }
@@ -284,11 +284,11 @@ void StatisticsCacheWriter::KeepWholeChunks(const std::function<void(const Chunk
 // Also with all chunks in it: the space is needed.
 void StatisticsCacheWriter::Remove() {
   ::unlink((path_ + ".partial").c_str());
-  folder_->Release(std::exchange(reserved_, 0));
+  folder_->files().Release(std::exchange(reserved_, 0));
 }
 
 Result<void> StatisticsCacheWriter::Write(std::string_view bytes) {
-  if (auto reserved = folder_->Reserve(bytes.size()); !reserved) {
+  if (auto reserved = folder_->files().Reserve(bytes.size()); !reserved) {
     Remove();
     return MakeError(reserved.error().code, "{}.partial: {}", path_, reserved.error().message);
   }

@@ -15,7 +15,7 @@
 
 #include "engine/common/open_file.h"
 #include "engine/core/result.h"
-#include "engine/statistics/cache_folder.h"
+#include "engine/statistics/cache_files.h"
 #include "engine/statistics/cached_averages.h"
 #include "engine/statistics/raster_statistics.h"
 

@@ -27,7 +27,7 @@ struct GlbOptions {
   std::string generator = "terrace";       // asset.generator
   std::optional<GlbTexture> texture = {};  // none: the ground is plain grey
   std::string copyright = {};              // asset.copyright (glTF 2.0, 3.2); empty: none
-  // Metres: written to the scene's extras if known and finite.
+  // Metres, in the scene's extras if set and finite.
   std::optional<double> max_error_m = {}, certified_error_m = {};
 };
 

@@ -5,10 +5,9 @@
 
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. Positions are rounded to a grid and stored as integers or as floats. The step
-// of the grid depends on level, error, lattice and edits, and is doubled in tiles with extreme cliffs. kDraco and kNone
-// have one grid and decode to the same positions, bit for bit; so do kQuantized and kMeshopt, whose grid may be
-// coarser.
+// How the mesh of a GLB tile is stored. Positions are rounded to a grid. kDraco and kNone have one grid, and decode to
+// the same positions, bit for bit. So do kQuantized and kMeshopt, whose grid may be coarser. The step of a grid depends
+// on level, error, lattice and edits; it is doubled in tiles with extreme cliffs.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats

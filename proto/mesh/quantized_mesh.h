@@ -10,8 +10,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/tile_key.h"
-#include "proto/media_type.h"
 #include "proto/mesh/water_mask.h"
+#include "proto/tile_extensions.h"
 
 namespace terrace::proto {
 

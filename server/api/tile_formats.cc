@@ -43,7 +43,7 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   const Result<TileParameters> parameters = ParseTileParameters(query, /*allow_at_least=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  tile.error_step = ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
+  tile.error_step = geo::ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
   tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
   tile.extensions.normals = wanted.normals && (!dataset.only_archive || dataset.only_archive->extent().normals);
@@ -63,7 +63,7 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
       ParseTileParameters(query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  tile.error_step = ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
+  tile.error_step = geo::ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
   tile.compression = parameters->compression.value_or(dataset.glb_compression);
   if (dataset.texture) tile.texture = parameters->texture.value_or(*dataset.texture);
   if (CodingHelps(tile)) tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));

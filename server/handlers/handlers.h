@@ -132,7 +132,7 @@ DocumentAnswer DescribeLayer(const HandlerState& state, const RequestContext& co
 Document PlainLayer(const DatasetView& dataset);
 // The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
 // printed in their shortest form and without '+', which CesiumJS would convert to a space.
-std::string TileQuery(const RequestedError& requested);
+std::string TileQuery(const geo::RequestedError& requested);
 
 // Adds the request's token to the query of a template if the token came in the query: such clients use templates
 // unchanged.

@@ -35,7 +35,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
 
 }  // namespace
 
-std::string TileQuery(const RequestedError& requested) {
+std::string TileQuery(const geo::RequestedError& requested) {
   if (requested.error_m) return fmt::format("error={}&atleast=1", Print(*requested.error_m));
   if (requested.fraction) return fmt::format("fraction={}", Print(*requested.fraction));
   return {};

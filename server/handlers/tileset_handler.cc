@@ -26,7 +26,7 @@ dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key, bo
 }
 
 // The query of the content templates for a request. The values of `compression` and `texture` have been checked.
-std::string ContentQuery(const RequestedError& requested, std::string_view query) {
+std::string ContentQuery(const geo::RequestedError& requested, std::string_view query) {
   std::string content = TileQuery(requested);
   const QueryParameters parameters = ParseQuery(query).value_or(QueryParameters());
   for (const std::string_view wanted : {"compression", "texture"}) {
@@ -38,7 +38,7 @@ std::string ContentQuery(const RequestedError& requested, std::string_view query
 
 // `requested`: as TileQuery writes it into the templates. `are_ranges_known`: set by TileTree::range, as RangeOf does;
 // must outlive the tree.
-tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested, bool& are_ranges_known) {
+tiler::TileTree TreeOf(const DatasetView& dataset, geo::RequestedError requested, bool& are_ranges_known) {
   return {dataset.version(),
           dataset.attribution,
           dataset.available,
@@ -46,11 +46,11 @@ tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested, boo
           dataset.error_scale.fraction,
           dataset.error_scale.max_source_level,
           [&](const geo::TileKey& key) { return RangeOf(dataset, key, are_ranges_known); },
-          [&dataset, requested](int level) { return ErrorStep(requested, level, dataset.error_scale); }};
+          [&dataset, requested](int level) { return geo::ErrorStep(requested, level, dataset.error_scale); }};
 }
 
 DocumentText WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots,
-                          RequestedError requested, const std::string& content_query,
+                          geo::RequestedError requested, const std::string& content_query,
                           const std::string& subtree_query) {
   requested.at_least = requested.error_m.has_value();
   DocumentText tileset;
@@ -114,7 +114,7 @@ DocumentAnswer DescribeSubtree(const HandlerState& state, const RequestContext& 
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin",
                            context.request->id);
   }
-  const RequestedError& requested = parameters->requested;
+  const geo::RequestedError& requested = parameters->requested;
   DocumentPlan plan;
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(context.route.key),
                          context.route.subtree_levels, TileQuery(requested), requested.at_least ? "" : " alone");

@@ -20,7 +20,7 @@ Result<void> SetLevel(const SentTexts& texts, tiler::DrawnSurface& drawn) {
   return {};
 }
 
-Result<void> SetRequested(const SentTexts& texts, tiler::RequestedError& requested) {
+Result<void> SetRequested(const SentTexts& texts, geo::RequestedError& requested) {
   for (const auto& [name, of] : {std::pair("error", &requested.error_m), std::pair("fraction", &requested.fraction)}) {
     const std::string* const text = TextOf(texts, name);
     if (text == nullptr) continue;

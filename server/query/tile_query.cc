@@ -34,7 +34,7 @@ Result<void> SetNamed(std::optional<T>& to, const char* name, std::string_view t
   return set ? SetOnce(to, value, name, /*repeatable=*/true) : set;
 }
 
-Result<void> CheckTogether(const RequestedError& requested) {
+Result<void> CheckTogether(const geo::RequestedError& requested) {
   if (requested.error_m && requested.fraction) {
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
   }
@@ -48,7 +48,7 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
   TileParameters parameters;
-  RequestedError& requested = parameters.requested;
+  geo::RequestedError& requested = parameters.requested;
   bool at_least_given = false;
   const bool repeatable = allow_compression;
   for (const auto& [name, value] : *sent) {

@@ -7,17 +7,15 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/geo/error_ladder.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
-#include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::server {
 
-using tiler::RequestedError;
-
 struct TileParameters {
-  RequestedError requested;
+  geo::RequestedError requested;
   std::vector<std::string> extensions;  // every `extensions` value
   std::optional<proto::GlbCompression> compression;
   std::optional<proto::TextureFormat> texture;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "archive/archive.h"
+#include "engine/gdal/stamped_files.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoder_version.h"
 #include "tiler/store/baked_tiles.h"

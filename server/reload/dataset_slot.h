@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "config/config.h"
+#include "engine/common/file_stamp.h"
 #include "engine/core/result.h"
-#include "engine/gdal/file_stamp.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::server {

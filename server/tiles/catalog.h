@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "engine/dem/elevation_model.h"
+#include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "engine/image/imagery.h"
 #include "proto/gltf/glb_tile.h"
 #include "tiler/encoder_version.h"
 #include "tiler/store/baked_tiles.h"
-#include "tiler/tile/requested_error.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::server {
@@ -27,7 +27,7 @@ namespace terrace::server {
 struct DatasetView : tiler::DatasetExtent {
   std::string name;
   std::string attribution;
-  tiler::ErrorScale error_scale = {};
+  geo::ErrorScale error_scale = {};
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   std::uint64_t generation = 0;        // changes whenever the bytes of its tiles may change
   std::uint64_t cache_generation = 0;  // the dataset's part of cache keys: Dataset::cache_generation

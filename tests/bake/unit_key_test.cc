@@ -47,7 +47,7 @@ TEST(UnitKey, DependsOnTheOptionsOfItsFormatAlone) {
     std::vector<tiler::TileFormat> changed;
   };
   const std::vector<Change> changes = {
-      {[](auto& of) { of.name = "other", of.options_hash = 1, of.generation = 2; }, {}},
+      {[](auto& of) { of.name = "other", of.generation = 2; }, {}},
       {[](auto& of) { of.attribution = "swisstopo"; }, {kGlb}},
       {[](auto& of) { of.glb.draco.speed = 3; }, {kGlb}},
       {[](auto& of) { of.glb.draco.normal_bits = 10; }, {kGlb}},

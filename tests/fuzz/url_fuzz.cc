@@ -51,12 +51,12 @@ void ExpectClientError(const Error& error) {
   TERRACE_CHECK(error.code == ErrorCode::kInvalidArgument || error.code == ErrorCode::kNotFound);
 }
 
-void ExpectInLadder(const RequestedError& requested) {
+void ExpectInLadder(const geo::RequestedError& requested) {
   TERRACE_CHECK(!requested.error_m || (std::isfinite(*requested.error_m) && *requested.error_m > 0));
   TERRACE_CHECK(!requested.fraction || (std::isfinite(*requested.fraction) && *requested.fraction > 0));
   for (const int level : {0, 7, geo::kMaxLevel}) {
     for (const int max_source_level : {0, geo::kMaxLevel}) {
-      const int step = ErrorStep(requested, level, {.max_source_level = max_source_level});
+      const int step = geo::ErrorStep(requested, level, {.max_source_level = max_source_level});
       TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
     }
   }

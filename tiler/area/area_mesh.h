@@ -11,8 +11,8 @@
 
 namespace terrace::tiler {
 
-// What the x, y and z of a vertex are. OBJ and PLY files store them directly. glTF is y-up: in a GLB file, the vertex
-// is at (x, z, -y) after the matrix of its node is applied.
+// The x, y and z of vertices in OBJ and PLY files. glTF is y-up: in a GLB file, the matrix of the node places the
+// vertex at (x, z, -y).
 enum class AreaCoordinates : std::uint8_t {
   kEnu,        // metres east, north and up of the area's centre on the ellipsoid
   kEcef,       // EPSG:4978
@@ -28,9 +28,10 @@ struct AreaRequest {
   AreaCoordinates coordinates = AreaCoordinates::kEnu;
 };
 
-// The samples that an area is meshed from: nodes of one level's lattice. The level is the first whose default error is
-// at most the requested error, or the sources' deepest. Levels that edits added are used only if they have all tiles of
-// the area and need at most `max_samples`. The area is clipped to the model's bounds, then extended to whole cells.
+// The samples that an area is meshed from: nodes of one level's lattice. The area is clipped to the model's bounds,
+// then extended to whole cells. The level is the first whose default error is at most the requested error, or the
+// sources' deepest. A level that edits added is used only if it has all tiles of the area and needs at most
+// `max_samples`.
 struct AreaPlan {
   int level = 0;
   bool depends_on_limit = false;  // the level may be another one for another `max_samples`
@@ -38,20 +39,24 @@ struct AreaPlan {
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };
 
-// kInvalidArgument, with a message for the client: a value that AreaRequest does not permit; the area does not
-// intersect the model; it intersects the model in two parts, one on each side of longitudes that the model does not
-// cover; it needs more than `max_samples`, or more than 32,768 samples on a side.
+// kInvalidArgument, with a message for the client:
+// - a value that AreaRequest does not permit
+// - an area that does not intersect the model, or intersects it in two parts with a range of longitudes between them
+//   that the model does not cover
+// - an area that needs more than `max_samples`, or more than 32,768 samples on a side
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 
-// Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
-// the flat triangles. Triangles in holes count, too, although the file does not have them. All triangles are flat in
-// the file's coordinates: in space, or for kGeographic in longitude, latitude and height. In space, positions of
-// vertices are rounded to 2^-10 m. A sample that is a vertex counts with its distance from the rounded position if that
-// is smaller: beside a nearly upright triangle, a small shift makes the vertical distance large. Rounding to 32 bits in
-// a GLB is not included. Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area
-// lies in a hole that edits cut, or the mesh exceeds the limits of the file format. Other errors: those of
-// ElevationModel::ReadNodes.
+// Reads, meshes, measures and encodes. Triangles are flat in the file's coordinates: in space, or for kGeographic in
+// longitude, latitude and height. In space, vertices are rounded to 2^-10 m.
+//
+// EncodedTile::max_error_m is the largest vertical distance between a sample and these triangles. Triangles in holes
+// count too, although the file does not have them. For a sample that is a vertex, the distance from its rounded
+// position counts if it is smaller: rounding moves a vertex sideways, and beside a steep triangle the vertical distance
+// is then large. Rounding to 32 bits in a GLB is not included.
+//
+// Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a hole that
+// edits cut, or the mesh exceeds the limits of the file format. Other errors: those of ElevationModel::ReadNodes.
 Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 

@@ -1,4 +1,4 @@
-// The parameters that the bytes of a map tile depend on. They are whole numbers, so that equal requests have one form.
+// The parameters of tiles for maps. They are whole numbers, so that equal requests have one form.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ enum class SlopeStyle : std::uint8_t {
   kDegrees,  // grey: twice the slope in degrees
 };
 
-// Members that a TileFormat does not use have their defaults.
+// Members that the TileFormat of the request does not use must have their defaults.
 struct MapParameters {
   // Unused by kContours. kJpeg is not permitted for kHillshade and kSlope.
   proto::PictureFormat picture = proto::PictureFormat::kPng;
@@ -21,8 +21,7 @@ struct MapParameters {
   std::uint8_t altitude_deg = 45;                // of the light above the horizon, 0 .. 90
   std::uint16_t z_factor_hundredths = 100;       // heights are multiplied by a hundredth of it, 1 .. 10000
   SlopeStyle slope_style = SlopeStyle::kColors;  // kSlope only
-  // kContours only: between contours; requests must set it. The encoder multiplies it by 5 until the tile has few
-  // enough points.
+  // kContours only: between contours, > 0. The encoder multiplies it by 5 until the tile has few enough points.
   std::uint32_t interval_cm = 0;
 
   friend bool operator==(const MapParameters&, const MapParameters&) = default;

@@ -1,9 +1,9 @@
-// The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order; the tier
-// that has it fills the tiers above. If none has it, it is built and goes into all of them. Stores may drop tiles.
-// Memory does not keep a tile that is larger than a 16th of `memory_bytes`. If `memory_bytes` is below 64 MiB, the
-// limit is all of it.
+// The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order. The tier
+// that has it fills the tiers above. If none has it, it is built, and goes into all of them. A store may drop it.
+// Memory does not keep a tile that is larger than a 16th of `memory_bytes`, or, if `memory_bytes` is below 64 MiB, than
+// all of it.
 //
-// Thread-safe. Look-ups of one key are not joined: two threads that ask for a tile at once may both build it.
+// Thread-safe. Two threads that ask for the same tile at once may both build it.
 #pragma once
 
 #include <atomic>
@@ -33,9 +33,9 @@ using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 
 class TileTiers {
  public:
-  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; no null pointers.
-  // `write_header_lines` is called once for each tile that is built or found in a store, and its lines are cached with
-  // the tile; null: they stay empty.
+  // `memory_bytes`: 0 keeps no tiles in memory. `stores`: below memory, the fastest first; none is null.
+  // `write_header_lines`: called once for each tile that is built or found in a store; its lines are cached with the
+  // tile. Null: they stay empty.
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
             HeaderWriter write_header_lines = nullptr);
   ~TileTiers();
@@ -52,8 +52,8 @@ class TileTiers {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // with the store's name; the slowest first
   };
-  // Erases the selected tiles from all tiers. Calls of FindOrBuild that have begun may still insert such tiles
-  // afterwards. Blocks. Errors: those of the stores. If one fails, the others are erased nevertheless.
+  // Erases the selected tiles from all tiers, also if one of them fails. Calls of FindOrBuild that have begun may
+  // insert such tiles afterwards. Blocks. Errors: those of the stores.
   Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
 
   // The sum of the durations of look-ups in each store.

@@ -7,6 +7,7 @@
 
 #include "engine/sight/quadratic.h"
 #include "engine/sight/ray_course.h"
+#include "engine/sight/sight_search.h"
 
 namespace terrace::tiler {
 namespace {

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "engine/core/result.h"
+#include "engine/geo/error_ladder.h"
 #include "proto/gltf/gltf_types.h"
-#include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
@@ -15,7 +15,7 @@ struct DrawnSurface {
   // Nothing: the first level whose default error is at most requested.error_m; the deepest if there is none, or if
   // error_m is not set.
   std::optional<int> level;
-  RequestedError requested = {};
+  geo::RequestedError requested = {};
   TileFormat format = TileFormat::kQuantizedMesh;         // or kGlb, only if the dataset has sources
   std::optional<proto::GlbCompression> compression = {};  // kGlb only; nothing: Dataset::glb.compression
 };

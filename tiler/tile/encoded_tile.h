@@ -1,5 +1,4 @@
-// An encoded tile, or the file of an area mesh. Tiles are immutable, and shared by the cache and all responses that
-// send them.
+// An encoded tile, or the file of an area mesh.
 #pragma once
 
 #include <chrono>
@@ -25,8 +24,7 @@ enum class RefinementUse : std::uint8_t {
   kNone,       // not used: formats without a mesh, meshes of areas, tiles that were not built
 };
 
-// Header lines of a response that depend on the tile and its TileRequest alone, not on the rest of the HTTP request or
-// on the configuration. Each ends with CR LF.
+// Header lines of a response that depend only on the tile and its TileRequest. Each ends with CR LF.
 struct HeaderLines {
   std::string text;
   // How many bytes at the beginning of `text` describe the body; responses without a body omit them.
@@ -36,20 +34,20 @@ struct HeaderLines {
 struct EncodedTile {
   std::string bytes;  // the body in its content coding
   std::string etag;   // strong, with the quotes
-  // The Terrain-Max-Error header, metres: the largest vertical distance between the tile's samples and the mesh that
-  // clients decode, measured on the encoded integers. Of height PNGs: the largest distance of a height from what its
-  // colour decodes to, also where the height is out of the encoding's range. Of area meshes: as BuildAreaMesh says. Of
-  // other formats: 0.
+  // Metres, the Terrain-Max-Error header: the largest vertical distance between the tile's samples and the mesh that
+  // clients decode. Of height PNGs: between the samples and the heights that the colours decode to. Of area meshes: as
+  // BuildAreaMesh says. Of other formats: 0.
   double max_error_m = 0;
-  // The Terrain-Certified-Error header, metres: an upper bound of the distance to every sample of the sources, each
-  // after the edits that apply to that sample. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.
+  // Metres, the Terrain-Certified-Error header: an upper bound of the vertical distance between this mesh and every
+  // sample of the sources, after the edits that apply to it. Only quantized-mesh and GLB tiles have it. Infinite: no
+  // bound is known.
   std::optional<double> certified_error_m = {};
   // Of the encoded mesh; in GLB tiles with the skirts. Formats without a mesh: 0.
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kNone;
-  // The store that it came from when TileTiers put it into memory (StoreBase::name); null: Build made it.
+  // The store where TileTiers found it (StoreBase::name); null: it was built.
   const char* found_in = nullptr;
   HeaderLines header_lines;  // written by the HeaderWriter of TileTiers; empty without one
 };

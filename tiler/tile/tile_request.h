@@ -7,7 +7,7 @@
 #include "engine/geo/tile_key.h"
 #include "proto/documents/picture_types.h"
 #include "proto/gltf/gltf_types.h"
-#include "proto/media_type.h"
+#include "proto/tile_extensions.h"
 #include "tiler/map/map_parameters.h"
 #include "tiler/tile/coding.h"
 
@@ -43,14 +43,15 @@ struct TileRequest {
   int error_step = 0;
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
-  // kGlb only; no effect without an image. In a dataset without sources it must be that of the archive.
+  // kGlb only; no effect without an image. In a dataset without sources, the texture that the archive's tiles have.
   proto::TextureFormat texture = proto::TextureFormat::kNone;
   Coding coding = Coding::kIdentity;
-  // kQuantizedMesh only: included if the tile has them. In a dataset without sources the archive's tile must have them.
+  // kQuantizedMesh only. A tile made from sources has those of them that the dataset has. In a dataset without sources,
+  // the archive's tile must have all of them.
   proto::TileExtensions extensions;
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
-  // Pixels along an edge: kHeightPng, and map layers except kContours. In Web Mercator formats their depth
-  // (ElevationModel::ReadMercator) is key.level if there are 256, and key.level + 1 if there are 512.
+  // Pixels along an edge, of kHeightPng and of all map layers but kContours. In Web Mercator, tiles of 256 pixels have
+  // the depth key.level (ElevationModel::ReadMercator), tiles of 512 pixels the depth key.level + 1.
   int side_px = kSidesPx[0];
   MapParameters map;  // IsMapLayer(format)
 

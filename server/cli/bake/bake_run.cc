@@ -111,7 +111,7 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
            {"error", error},
            {"extensions", extensions.empty() ? "none" : extensions},
            {"gzip", arguments.no_gzip ? "no" : "yes"},
-           {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options_hash)}}};
+           {"dataset options and encoders (hash)", fmt::format("{:016x}", GenerationOf(dataset, /*heights=*/0))}}};
 }
 
 // A bake that was killed between two manifests has those of some formats. The others have no old units.

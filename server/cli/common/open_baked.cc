@@ -12,7 +12,7 @@
 #include "archive/baked_tiles.h"
 #include "archive/manifest.h"
 #include "config/options/options.h"
-#include "engine/gdal/file_stamp.h"
+#include "engine/common/file_stamp.h"
 #include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
 #include "tiler/tile/tile_request.h"

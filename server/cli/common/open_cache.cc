@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "config/common/cache_place.h"
-#include "engine/statistics/averages_budget.h"
+#include "engine/common/averages_budget.h"
 #include "engine/statistics/cache_folder.h"
 #include "server/cli/common/check_folder.h"
 

@@ -120,7 +120,6 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
   if (dataset.model->info().edits > 0) {
     dataset.unedited_generation = GenerationOf(dataset, dataset.model->unedited_fingerprint());
   }
-  dataset.options_hash = GenerationOf(dataset, 0);
   return dataset;
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "engine/gdal/file_content.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/image/imagery.h"
 #include "engine/image/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"

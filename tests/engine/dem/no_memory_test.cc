@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/crs/geoid.h"
+#include "engine/gdal/stamped_files.h"
 #include "engine/image/image_pool.h"
 #include "tests/engine/dem/dem_fixture.h"
 

@@ -20,6 +20,7 @@
 #include "engine/gdal/raster_file.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/sources/raster_source.h"
+#include "engine/statistics/cache_files.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -115,7 +116,7 @@ TEST(Prepare, StatisticsAreTheSameOnSeveralThreads) {
     EXPECT_EQ(last, 1);
     ExpectSameAverages(path, **source);
     for (const auto& file : std::filesystem::directory_iterator(cache)) {
-      if (file.path().extension() != CacheFolder::kEnding) continue;
+      if (file.path().extension() != CacheFolder::Files::kEnding) continue;
       std::ifstream in(file.path(), std::ios::binary);
       written.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
     }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/sight/grid_sight.h"
+#include "engine/sight/sight_search.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "engine/gdal/source_policy.h"
+#include "engine/gdal/stamped_files.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -111,8 +111,9 @@ TEST(NegotiateTile, GivesNoExtensionThatTheTileHasNot) {
   EXPECT_EQ(extensions("/wet/0/0/0.terrain"), proto::TileExtensions{});
 }
 
-RequestedError Requested(std::optional<double> error_m, bool at_least = false, std::optional<double> fraction = {}) {
-  RequestedError requested;
+geo::RequestedError Requested(std::optional<double> error_m, bool at_least = false,
+                              std::optional<double> fraction = {}) {
+  geo::RequestedError requested;
   requested.error_m = error_m;
   requested.at_least = at_least;
   requested.fraction = fraction;
@@ -121,19 +122,19 @@ RequestedError Requested(std::optional<double> error_m, bool at_least = false, s
 
 TEST(NegotiateTile, PutsErrorsOnTheLadder) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Requested({}), 10, {}), 0);
-  EXPECT_EQ(ErrorStep(Requested(d), 10, {}), 0);
-  EXPECT_EQ(ErrorStep(Requested(d * 0.99), 10, {}), 1) << "down, never up";
-  EXPECT_EQ(ErrorStep(Requested(d / 2), 10, {}), 4);
-  EXPECT_EQ(ErrorStep(Requested(d * 4), 10, {}), -8);
-  EXPECT_EQ(ErrorStep(Requested(1e308), 24, {}), geo::kCoarsestStep);
-  EXPECT_EQ(ErrorStep(Requested(5e-324), 0, {}), geo::kFinestStep);
+  EXPECT_EQ(geo::ErrorStep(Requested({}), 10, {}), 0);
+  EXPECT_EQ(geo::ErrorStep(Requested(d), 10, {}), 0);
+  EXPECT_EQ(geo::ErrorStep(Requested(d * 0.99), 10, {}), 1) << "down, never up";
+  EXPECT_EQ(geo::ErrorStep(Requested(d / 2), 10, {}), 4);
+  EXPECT_EQ(geo::ErrorStep(Requested(d * 4), 10, {}), -8);
+  EXPECT_EQ(geo::ErrorStep(Requested(1e308), 24, {}), geo::kCoarsestStep);
+  EXPECT_EQ(geo::ErrorStep(Requested(5e-324), 0, {}), geo::kFinestStep);
 }
 
 TEST(NegotiateTile, AtLeastNeverGoesBelowTheDefault) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Requested(d / 8, true), 10, {}), 0);
-  EXPECT_EQ(ErrorStep(Requested(d * 2, true), 10, {}), -4);
+  EXPECT_EQ(geo::ErrorStep(Requested(d / 8, true), 10, {}), 0);
+  EXPECT_EQ(geo::ErrorStep(Requested(d * 2, true), 10, {}), -4);
 }
 
 // No finer level follows the deepest one, so without this rule layer.json?error=E would never show E. A tile of another
@@ -161,20 +162,21 @@ TEST(NegotiateTile, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
 
 TEST(NegotiateTile, AFractionScalesEveryLevelAlike) {
   for (int level = 0; level <= 20; ++level) {
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.5), level, {}), 0);
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, {}), 4);
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, {.fraction = 0.25}), 0);
+    EXPECT_EQ(geo::ErrorStep(Requested({}, false, 0.5), level, {}), 0);
+    EXPECT_EQ(geo::ErrorStep(Requested({}, false, 0.25), level, {}), 4);
+    EXPECT_EQ(geo::ErrorStep(Requested({}, false, 0.25), level, {.fraction = 0.25}), 0);
   }
-  EXPECT_EQ(ErrorStep(Requested({}, false, 1e308), 0, {}), geo::kCoarsestStep) << "the product overflows";
-  EXPECT_EQ(ErrorStep(Requested({}, false, 5e-324), 24, {}), geo::kFinestStep) << "the product underflows";
+  EXPECT_EQ(geo::ErrorStep(Requested({}, false, 1e308), 0, {}), geo::kCoarsestStep) << "the product overflows";
+  EXPECT_EQ(geo::ErrorStep(Requested({}, false, 5e-324), 24, {}), geo::kFinestStep) << "the product underflows";
 }
 
 // A million requested errors must not make a million cache entries.
 TEST(NegotiateTile, ComesToFortyOneErrorsAtMost) {
   constexpr int kErrors = 1'000'000;
   std::set<int> steps;
-  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(std::exp2(-400 + 800.0 * i / kErrors)), 7, {}));
-  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(i * 0.01 + 0.003), 7, {}));
+  for (int i = 0; i < kErrors; ++i)
+    steps.insert(geo::ErrorStep(Requested(std::exp2(-400 + 800.0 * i / kErrors)), 7, {}));
+  for (int i = 0; i < kErrors; ++i) steps.insert(geo::ErrorStep(Requested(i * 0.01 + 0.003), 7, {}));
   EXPECT_EQ(*steps.begin(), geo::kCoarsestStep);
   EXPECT_EQ(*steps.rbegin(), geo::kFinestStep);
   RecordProperty("errors", 2 * kErrors);
@@ -327,14 +329,15 @@ TEST(NegotiateTile, GlbTilesAreCanonicalToo) {
 TEST(NegotiateTile, AParentIsAtMostTwiceAsCoarse) {
   for (int level = 1; level <= geo::kMaxLevel; ++level) {
     for (double error_m = 1e-5; error_m < 1e8; error_m *= 1.31) {
-      for (const RequestedError& requested : {RequestedError{error_m, {}, false}, RequestedError{error_m, {}, true},
-                                              RequestedError{{}, error_m / 1000, false}, RequestedError{}}) {
+      for (const geo::RequestedError& requested :
+           {geo::RequestedError{error_m, {}, false}, geo::RequestedError{error_m, {}, true},
+            geo::RequestedError{{}, error_m / 1000, false}, geo::RequestedError{}}) {
         const auto error = [&](int at) {
-          return geo::LadderError(at, ErrorStep(requested, at, {.max_source_level = geo::kMaxLevel + 1}), 0.5);
+          return geo::LadderError(at, geo::ErrorStep(requested, at, {.max_source_level = geo::kMaxLevel + 1}), 0.5);
         };
         EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << error_m;
         const double skirt =
-            proto::SkirtError(level, ErrorStep(requested, level, {.max_source_level = level}), true, 0.5);
+            proto::SkirtError(level, geo::ErrorStep(requested, level, {.max_source_level = level}), true, 0.5);
         EXPECT_LE(error(level - 1), 2 * skirt * (1 + 1e-12)) << "deepest: " << level << ", " << error_m;
       }
     }

@@ -69,12 +69,12 @@ TEST_F(LayerHandlerTest, CompressesOnRequest) {
 }
 
 TEST(TileQuery, PrintsNumbersThatSurviveUrls) {
-  RequestedError requested;
+  geo::RequestedError requested;
   requested.error_m = 1e20;
   EXPECT_EQ(TileQuery(requested), "error=1e20&atleast=1") << "a '+' would become a space";
   requested.error_m = 0.1;
   EXPECT_EQ(TileQuery(requested), "error=0.1&atleast=1");
-  EXPECT_EQ(TileQuery(RequestedError()), "");
+  EXPECT_EQ(TileQuery(geo::RequestedError()), "");
 }
 
 }  // namespace

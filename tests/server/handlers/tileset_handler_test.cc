@@ -170,10 +170,10 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
         proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree").append(query)).body, 6);
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_EQ(read->min_heights.size(), 1365u);
-    RequestedError requested;
+    geo::RequestedError requested;
     if (query.starts_with("?e")) requested = {.error_m = 600, .fraction = {}, .at_least = true};
     if (query.starts_with("?f")) requested.fraction = 0.02;
-    const int step = ErrorStep(requested, 12, {.max_source_level = 12});
+    const int step = geo::ErrorStep(requested, 12, {.max_source_level = 12});
     const double error_m = geo::LadderError(12, step);
     const double lowest = -120 - proto::SkirtDepth(12, proto::SkirtError(12, step, true, 0.5));
     EXPECT_LE(read->min_heights[341], lowest) << query;

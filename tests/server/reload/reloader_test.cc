@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "engine/gdal/stamped_files.h"
 #include "server/tiles/catalog.h"
 #include "tests/support/source_dir.h"
 

@@ -1,37 +1,16 @@
-// Identifies the state of a file by device, inode, size, times of modification and of change of status.
+// Files as they were when they were opened, to notice that one of them has changed.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
+#include "engine/common/file_stamp.h"
 #include "engine/core/result.h"
 
 namespace terrace::dem {
-
-struct FileStamp {
-  std::uint64_t device = 0, inode = 0, size = 0, modified_ns = 0;
-  // Time of the last status change (ctime), which a program cannot set back. Part of the fingerprint that cached files
-  // are keyed by. Not compared by ==: a change of permissions must not count as a change of an open file.
-  std::uint64_t status_changed_ns = 0;
-
-  friend bool operator==(const FileStamp& a, const FileStamp& b) {
-    return a.device == b.device && a.inode == b.inode && a.size == b.size && a.modified_ns == b.modified_ns;
-  }
-};
-
-// Returns the file's stamp; nullopt if `path` or `descriptor` is not a regular file.
-std::optional<FileStamp> StampOf(const std::string& path);
-std::optional<FileStamp> StampOf(int descriptor);
-
-// How the bytes of files are hashed (file_content.h).
-struct FileContentOptions {
-  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
-  std::stop_token stop = {};
-};
 
 // Returns kChanged with the message that `path` is no longer the file that was opened.
 Error ChangedError(const std::string& path);

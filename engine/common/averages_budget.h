@@ -6,7 +6,7 @@
 
 namespace terrace::dem {
 
-// The bytes available for averages of all rasters that are opened with this object (RasterCache::memory). Thread-safe.
+// The bytes that all models opened with this object (RasterCache::memory) may use for averages. Thread-safe.
 class AveragesBudget {
  public:
   static constexpr std::size_t kDefaultBytes = std::size_t{128} << 20;

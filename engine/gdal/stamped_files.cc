@@ -1,8 +1,7 @@
-#include "engine/gdal/file_stamp.h"
+#include "engine/gdal/stamped_files.h"
 
 #include <cpl_string.h>
 #include <cpl_vsi.h>
-#include <sys/stat.h>
 #include <xxhash.h>
 
 #include <random>
@@ -37,27 +36,7 @@ std::uint64_t OtherFingerprint(const std::string& path) {
   return Hash(writer.Take());
 }
 
-std::optional<FileStamp> StampFrom(const struct stat& status) {
-  if (!S_ISREG(status.st_mode)) return std::nullopt;
-  const auto nanoseconds = [](const timespec& time) {
-    return static_cast<std::uint64_t>(time.tv_sec) * 1'000'000'000 + static_cast<std::uint64_t>(time.tv_nsec);
-  };
-  return FileStamp{static_cast<std::uint64_t>(status.st_dev), static_cast<std::uint64_t>(status.st_ino),
-                   static_cast<std::uint64_t>(status.st_size), nanoseconds(status.st_mtim),
-                   nanoseconds(status.st_ctim)};
-}
-
 }  // namespace
-
-std::optional<FileStamp> StampOf(const std::string& path) {
-  struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 ? StampFrom(status) : std::nullopt;
-}
-
-std::optional<FileStamp> StampOf(int descriptor) {
-  struct stat status {};
-  return ::fstat(descriptor, &status) == 0 ? StampFrom(status) : std::nullopt;
-}
 
 Error ChangedError(const std::string& path) {
   return {ErrorCode::kChanged,
