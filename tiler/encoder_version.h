@@ -11,7 +11,7 @@ namespace terrace::tiler {
 // subtree, mesh or list of heights, or an error in a header. Clients and CDNs keep versioned replies for a year:
 // without a new number they would mix old bytes with new ones. Changes of options and libraries need no new number:
 // both are part of the version. A test records the bytes of some tiles for this number.
-inline constexpr int kEncoderVersion = 10;
+inline constexpr int kEncoderVersion = 11;
 
 // Returns kEncoderVersion and the versions of the libraries that affect bytes: GDAL, PROJ, Draco and others.
 std::string EncoderText();

@@ -1,4 +1,4 @@
-// Averages of blocks of samples in memory, accumulated row by row; raster_layout.h reads averages of a raster, and
+// Averages of blocks of samples in memory (block_sums.h); raster_layout.h reads averages of a raster, and
 // declares GridAxis and GridWindow. The order of summation is fixed, so results are bit-identical.
 #pragma once
 
@@ -27,50 +27,6 @@ inline void CopyRows(const float* samples, std::int64_t columns, std::int64_t ro
   }
 }
 
-// Averages of one row of blocks of block x block samples. Each block is summed row by row, independently of its
-// neighbours. Blocks of more than kLargestPlain samples a side are summed from blocks of that size, so averages
-// computed from parts of a raster that fit into memory (raster_statistics.h) have the same bits.
-class BlockAverages {
- public:
-  static constexpr int kLargestPlain = 1024;
-
-  BlockAverages(std::int64_t blocks, int block)
-      : parts_(block > kLargestPlain ? block / kLargestPlain : 1),
-        plain_(block / parts_),
-        inner_(static_cast<std::size_t>(blocks * parts_)),
-        outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
-
-  // Adds a row of samples with weight `weight`. The last sample has `weight` * `last`: it may cover fewer pixels.
-  void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
-    const std::int64_t whole = (last == 1 ? count : count - 1) / plain_;  // blocks of samples of equal weight
-    AddRowOfBlocks(samples, plain_, weight, std::span(inner_).first(static_cast<std::size_t>(whole)));
-    for (std::int64_t i = whole * plain_; i < count; ++i) {
-      inner_[static_cast<std::size_t>(whole)].Add(samples[i], i + 1 == count ? weight * last : weight);
-    }
-    if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
-  }
-
-  // Writes one average per block, NaN for a block without a valid sample, and starts the next row of blocks.
-  void Take(float* out) {
-    if (parts_ > 1 && rows_ > 0) Gather();
-    TakeMeans(parts_ > 1 ? outer_ : inner_, out);
-  }
-
- private:
-  void Gather() {
-    for (std::size_t i = 0; i < inner_.size(); ++i) {
-      outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
-      inner_[i] = {};
-    }
-    rows_ = 0;
-  }
-
-  int parts_, plain_;
-  int rows_ = 0;                 // of samples in inner_ that are not gathered yet
-  std::vector<BlockSum> inner_;  // of blocks, or of parts of blocks
-  std::vector<BlockSum> outer_;
-};
-
 // Computes a window of averages of block x block values. Each value covers a block of `step` samples; `columns` and
 // `rows` are the axes of the values. Calls read(window, add) for windows of values that do not wrap; it passes their
 // rows to `add` (sample_rules.h).
@@ -88,8 +44,11 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
     const std::int64_t width = std::min(columns.count() - first, blocks * block);
     const double last = ShareOf(first + width - 1, step, columns.samples());
     const bool is_plain = block == 1 && width == blocks;
-    BlockAverages averages(is_plain ? 0 : blocks, block);
+    BlockSums sums(blocks, block);
     std::int64_t done = 0;  // rows of values
+    const auto visit = [&](int side, std::int64_t row, std::span<const BlockSum> of_blocks) {
+      if (side == block) WriteMeans(of_blocks, out + row * window.columns);
+    };
     const AddRows add = [&](const float* values, std::int64_t count) {
       if (is_plain) {
         CopyRows(values, width, count, out + done * window.columns, window.columns);
@@ -97,9 +56,8 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
         return;
       }
       for (; count > 0; --count, values += width) {
-        averages.AddRow(values, width, ShareOf(top + done, step, rows.samples()), last);
-        ++done;
-        if (done % block == 0 || done == height) averages.Take(out + (done - 1) / block * window.columns);
+        sums.AddRow(values, width, ShareOf(top + done, step, rows.samples()), last, visit);
+        if (++done == height) sums.Finish(visit);
       }
     };
     // A limited number of rows at a time, because a row of blocks can be the whole raster.

@@ -23,7 +23,7 @@ HWY_INLINE void AddSamples(D d, hn::Vec<F> samples, hn::Vec<D> weight, hn::Vec<D
   weights = hn::Add(weights, hn::IfThenElseZero(is_valid, weight));
 }
 
-void AddPairs(const float* samples, double weight, std::span<BlockSum> sums) {
+void AddPairsOfSamples(const float* samples, double weight, std::span<BlockSum> sums) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> f;
   using F = decltype(f);
@@ -44,41 +44,7 @@ void AddPairs(const float* samples, double weight, std::span<BlockSum> sums) {
   }
 }
 
-// Blocks of a multiple of 4 samples: vectors of 4 blocks, whose samples are transposed, 4 of each at a time.
-void AddBlocks(const float* samples, std::size_t block, double weight, std::span<BlockSum> sums) {
-  std::size_t i = 0;
-#if HWY_TARGET != HWY_SCALAR  // has no lanes to transpose
-  const hn::CappedTag<double, 4> d;
-  if constexpr (hn::MaxLanes(d) == 4) {
-    const hn::Rebind<float, decltype(d)> f;
-    using F = decltype(f);
-    const auto weight_of = hn::Set(d, weight);
-    for (; i + 4 <= sums.size(); i += 4) {
-      hn::Vec<decltype(d)> sum, weights;
-      hn::LoadInterleaved2(d, &sums[i].sum, sum, weights);
-      const float* const first = samples + i * block;
-      for (std::size_t k = 0; k < block; k += 4) {
-        const auto a = hn::LoadU(f, first + k), b = hn::LoadU(f, first + block + k);
-        const auto c = hn::LoadU(f, first + 2 * block + k), e = hn::LoadU(f, first + 3 * block + k);
-        const auto lower_ab = hn::InterleaveLower(f, a, b), upper_ab = hn::InterleaveUpper(f, a, b);
-        const auto lower_ce = hn::InterleaveLower(f, c, e), upper_ce = hn::InterleaveUpper(f, c, e);
-        AddSamples<decltype(d), F>(d, hn::ConcatLowerLower(f, lower_ce, lower_ab), weight_of, sum, weights);
-        AddSamples<decltype(d), F>(d, hn::ConcatUpperUpper(f, lower_ce, lower_ab), weight_of, sum, weights);
-        AddSamples<decltype(d), F>(d, hn::ConcatLowerLower(f, upper_ce, upper_ab), weight_of, sum, weights);
-        AddSamples<decltype(d), F>(d, hn::ConcatUpperUpper(f, upper_ce, upper_ab), weight_of, sum, weights);
-      }
-      hn::StoreInterleaved2(sum, weights, d, &sums[i].sum);
-    }
-  }
-#endif
-  for (; i < sums.size(); ++i) {
-    BlockSum sum = sums[i];
-    for (std::size_t k = 0; k < block; ++k) sum.Add(samples[i * block + k], weight);
-    sums[i] = sum;
-  }
-}
-
-void Take(std::span<BlockSum> sums, float* means) {
+void Means(std::span<const BlockSum> sums, float* means) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> f;
   const std::size_t lanes = hn::Lanes(d);
@@ -89,12 +55,8 @@ void Take(std::span<BlockSum> sums, float* means) {
     hn::LoadInterleaved2(d, &sums[i].sum, sum, weights);
     const auto mean = hn::IfThenElse(hn::Eq(weights, zero), none, hn::Div(sum, weights));
     hn::StoreU(hn::DemoteTo(f, mean), f, means + i);
-    hn::StoreInterleaved2(zero, zero, d, &sums[i].sum);
   }
-  for (; i < sums.size(); ++i) {
-    means[i] = sums[i].Mean();
-    sums[i] = {};
-  }
+  for (; i < sums.size(); ++i) means[i] = sums[i].Mean();
 }
 
 }  // namespace
@@ -106,23 +68,25 @@ HWY_AFTER_NAMESPACE();
 namespace terrace::dem {
 namespace {
 
-HWY_EXPORT(AddPairs);
-HWY_EXPORT(AddBlocks);
-HWY_EXPORT(Take);
+HWY_EXPORT(AddPairsOfSamples);
+HWY_EXPORT(Means);
 
 }  // namespace
 
-void AddRowOfBlocks(const float* samples, int block, double weight, std::span<BlockSum> sums) {
-  if (block == 2) return HWY_DYNAMIC_DISPATCH(AddPairs)(samples, weight, sums);
-  if (block % 4 == 0) return HWY_DYNAMIC_DISPATCH(AddBlocks)(samples, static_cast<std::size_t>(block), weight, sums);
-  for (BlockSum& to : sums) {
-    BlockSum sum = to;
-    for (const float* const end = samples + block; samples != end; ++samples) sum.Add(*samples, weight);
-    to = sum;
-  }
+void AddPairs(const float* samples, double weight, std::span<BlockSum> sums) {
+  HWY_DYNAMIC_DISPATCH(AddPairsOfSamples)(samples, weight, sums);
 }
 
-void TakeMeans(std::span<BlockSum> sums, float* means) { HWY_DYNAMIC_DISPATCH(Take)(sums, means); }
+void AddPairs(std::span<const BlockSum> values, std::span<BlockSum> sums) {
+  const std::size_t pairs = values.size() / 2;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    sums[i].Add(values[2 * i]);
+    sums[i].Add(values[2 * i + 1]);
+  }
+  if (values.size() % 2 != 0) sums[pairs].Add(values.back());
+}
+
+void WriteMeans(std::span<const BlockSum> sums, float* means) { HWY_DYNAMIC_DISPATCH(Means)(sums, means); }
 
 }  // namespace terrace::dem
 #endif

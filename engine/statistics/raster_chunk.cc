@@ -1,10 +1,13 @@
 #include "engine/statistics/raster_chunk.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "engine/common/dem_types.h"
 #include "engine/statistics/averaging_errors.h"
@@ -90,20 +93,6 @@ ContentHash HashOf(const Samples& samples, const Chunk& chunk) {
   return hasher.Hash();
 }
 
-// Sums of the blocks of a box of samples. The box begins at a block and ends with a block or the raster.
-std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int factor) {
-  const int columns = DivideUp(box.cols, factor);
-  std::vector<BlockSum> sums(Area(columns, DivideUp(box.rows, factor)));
-  for (int r = 0; r < box.rows; ++r) {
-    const float* row = samples.Row(box.row + r) + (box.col - samples.box.col);
-    BlockSum* to = sums.data() + std::ptrdiff_t{r / factor} * columns;
-    const int whole = box.cols / factor;
-    AddRowOfBlocks(row, factor, 1, {to, static_cast<std::size_t>(whole)});
-    for (int c = whole * factor; c < box.cols; ++c) to[whole].Add(row[c]);
-  }
-  return sums;
-}
-
 // All averages that the surface over a chunk's samples is interpolated from.
 struct Averages {
   GridWindow window;
@@ -122,43 +111,89 @@ GridWindow AveragesAround(const Chunk& chunk, const RasterLayout& layout, int fa
   return {west, north, east - west + 1, south - north + 1};
 }
 
-// Computed from the samples, or read by ReadAverages if there is an overview.
-Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
-                               const Chunk& chunk, int factor, const std::stop_token& stop) {
-  Averages averages{AveragesAround(chunk, layout, factor), {}};
-  const GridWindow& window = averages.window;
-  if (StartingFactor(layout, factor) > 1) {
-    auto read = ReadAverages(dataset, layout, factor, window, stop);
-    if (!read) return tl::unexpected(read.error());
-    averages.heights = *std::move(read);
-    return averages;
+// The largest factor up to kLargestMeasuredFactor whose averages start from the samples, not from an overview; 1: none.
+int LargestSummedFactor(const RasterLayout& layout) {
+  int summed = 1;
+  ForEachFactor(layout, 2, kLargestMeasuredFactor, [&](int factor) {
+    if (StartingFactor(layout, factor) == 1) summed = factor;
+  });
+  return summed;
+}
+
+// Averages around a chunk, and sums of its blocks.
+struct BlocksOfChunk {
+  std::vector<Averages> averages;           // of the factors 2, 4, ...
+  std::vector<std::vector<BlockSum>> sums;  // of the factors 128, 256, ...; row by row
+};
+
+// Sums samples to averages of the factors up to `largest`, and to the sums of all larger factors that start from
+// samples.
+BlocksOfChunk SumBlocks(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, int largest) {
+  const Chunk& box = samples.box;  // begins at a block of the largest factor
+  const int width = std::min(box.col + box.cols, layout.columns) - box.col;
+  const int used = std::min(chunk.cols, layout.columns - chunk.col);
+  const auto index_of = [](int side) {
+    return static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(side)) - 1);
+  };
+  BlocksOfChunk blocks;
+  ForEachFactor(layout, 2 * kLargestMeasuredFactor, ChunkGrid::kSide, [&](int) { blocks.sums.emplace_back(); });
+  const auto add_sums = [&](int side, std::int64_t, std::span<const BlockSum> sums) {
+    const int factor = side * kLargestMeasuredFactor;
+    if (index_of(side) >= blocks.sums.size() || StartingFactor(layout, factor) > 1) return;
+    std::vector<BlockSum>& to = blocks.sums[index_of(side)];
+    to.insert(to.end(), sums.begin(), sums.begin() + DivideUp(used, factor));
+  };
+  BlockSums large(1, ChunkGrid::kSide / kLargestMeasuredFactor);
+  for (int factor = 2; factor <= largest; factor *= 2) {
+    const GridWindow window = AveragesAround(chunk, layout, factor);
+    blocks.averages.push_back({window, std::vector<float>(static_cast<std::size_t>(window.columns * window.rows))});
   }
-  averages.heights.resize(static_cast<std::size_t>(window.columns * window.rows));
-  const Chunk& box = samples.box;  // begins at a block
-  const std::int64_t end = std::min(box.col + box.cols, layout.columns), bottom = box.row + box.rows;
-  const std::int64_t west = std::max<std::int64_t>(window.column, box.col / factor);
-  const std::int64_t east =
-      std::min<std::int64_t>(window.column + window.columns, DivideUp(static_cast<int>(end), factor));
-  const std::int64_t left = west * factor, width = std::min(east * factor, end) - left;
-  BlockAverages blocks(east - west, factor);
-  for (std::int64_t r = 0; r < window.rows; ++r) {
-    const std::int64_t top = (window.row + r) * factor;
-    for (std::int64_t row = top; row < std::min(top + factor, bottom); ++row) {
-      blocks.AddRow(samples.Row(static_cast<int>(row)) + (left - box.col), width);
+  const auto add_averages = [&](int factor, std::int64_t row, std::span<const BlockSum> sums) {
+    Averages& to = blocks.averages[index_of(factor)];
+    const GridWindow& window = to.window;
+    const std::int64_t at = box.row / factor + row, first = box.col / factor;
+    if (at >= window.row && at < window.row + window.rows) {
+      const std::int64_t west = std::max(window.column, first);
+      const std::int64_t east = std::min(window.column + window.columns, first + DivideUp(width, factor));
+      WriteMeans(sums.subspan(static_cast<std::size_t>(west - first), static_cast<std::size_t>(east - west)),
+                 to.heights.data() + IndexAt(west - window.column, at - window.row, window.columns));
     }
-    blocks.Take(averages.heights.data() + r * window.columns + (west - window.column));
-  }
-  // Around the Earth.
+    if (factor != kLargestMeasuredFactor || at * factor < chunk.row || at * factor >= chunk.row + chunk.rows) return;
+    large.AddRow(sums.subspan(static_cast<std::size_t>((chunk.col - box.col) / factor),
+                              static_cast<std::size_t>(DivideUp(used, factor))),
+                 add_sums);
+  };
+  BlockSums small(DivideUp(width, largest), largest);
+  for (int row = box.row; row < box.row + box.rows; ++row) small.AddRow(samples.Row(row), width, 1, 1, add_averages);
+  small.Finish(add_averages);
+  large.Finish(add_sums);
+  return blocks;
+}
+
+// Adds averages from around the Earth, which the box of samples does not reach.
+Result<Averages> ReadAround(GDALDataset& dataset, const RasterLayout& layout, const Chunk& box, int factor,
+                            const std::stop_token& stop, Averages averages) {
+  const GridWindow& window = averages.window;
+  const std::int64_t first = box.col / factor;
+  const std::int64_t end = DivideUp(std::min(box.col + box.cols, layout.columns), factor);
   for (std::int64_t c = 0; c < window.columns; ++c) {
     const std::int64_t column = window.column + c;
-    if (column >= west && column < east) continue;
-    auto read = ReadAverages(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
+    if (column >= first && column < end) continue;
+    const auto read = ReadAverages(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::int64_t r = 0; r < window.rows; ++r) {
-      averages.heights[static_cast<std::size_t>(r * window.columns + c)] = (*read)[static_cast<std::size_t>(r)];
+      averages.heights[IndexAt(c, r, window.columns)] = (*read)[static_cast<std::size_t>(r)];
     }
   }
   return averages;
+}
+
+Result<Averages> ReadFromOverview(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk, int factor,
+                                  const std::stop_token& stop) {
+  const GridWindow window = AveragesAround(chunk, layout, factor);
+  auto heights = ReadAverages(dataset, layout, factor, window, stop);
+  if (!heights) return tl::unexpected(heights.error());
+  return Averages{window, *std::move(heights)};
 }
 
 // Adds the differences between one row of samples and the surface between averages to its blocks.
@@ -286,16 +321,23 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
   if (chunk.col >= layout.columns) return {};
   statistics.averages.clear();
   const unsigned kept = KeptFactors(layout);
+  const int summed = LargestSummedFactor(layout);
+  BlocksOfChunk blocks;
+  if (summed > 1) blocks = SumBlocks(samples, chunk, layout, summed);
+  statistics.sums = std::move(blocks.sums);
   Result<void> result;
   ForEachFactor(layout, 2, kLargestMeasuredFactor, [&](int factor) {
     if (!result) return;
-    const auto averages = AverageAround(dataset, layout, samples, chunk, factor, stop);
+    const std::size_t k = statistics.averages.size();
+    auto averages = factor <= summed
+                        ? ReadAround(dataset, layout, samples.box, factor, stop, std::move(blocks.averages[k]))
+                        : ReadFromOverview(dataset, layout, chunk, factor, stop);
     if (!averages) {
       result = tl::unexpected(averages.error());
       return;
     }
     const int pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
-    std::vector<float>& errors = statistics.errors[statistics.averages.size()];
+    std::vector<float>& errors = statistics.errors[k];
     RowErrors rows(*averages, chunk, layout, factor, pixels);
     for (int r = 0; r < chunk.rows; ++r) {
       rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r,
@@ -418,13 +460,6 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, statistics); !compared) {
     return tl::unexpected(compared.error());
   }
-  Chunk used = chunk;
-  used.cols = std::min(chunk.cols, layout.columns - chunk.col);
-  statistics.sums.clear();
-  ForEachFactor(layout, 2 * kLargestMeasuredFactor, ChunkGrid::kSide, [&](int factor) {
-    statistics.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
-                                                                                   : std::vector<BlockSum>());
-  });
   return statistics;
 }
 

@@ -1,8 +1,10 @@
 #include "engine/statistics/raster_statistics.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "engine/statistics/kept_factors.h"
@@ -283,20 +285,23 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& chu
 Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::stop_token& stop) {
   CoarseAverages& coarse = statistics_.coarse;
   if (!coarse.grids.empty()) {
-    // Adds sums of chunks row by row, in the order of BlockAverages.
+    // Averages of blocks of several chunks.
     const int columns = DivideUp(layout_.columns, ChunkGrid::kSide), rows = DivideUp(layout_.height, ChunkGrid::kSide);
-    for (std::size_t k = 0; k < coarse.grids.size(); ++k) {
-      const int chunks = (kLargestMeasuredFactor << k) / ChunkGrid::kSide;
-      if (chunks < 2) continue;
-      CoarseAverages::Grid& grid = coarse.grids[k];
-      std::vector<BlockSum> sums(grid.heights.size());
-      for (int r = 0; r < rows; ++r) {
-        for (int c = 0; c < columns; ++c) {
-          sums[static_cast<std::size_t>(r / chunks * grid.columns + c / chunks)].Add(
-              largest_sums_[static_cast<std::size_t>(r * columns + c)]);
-        }
+    const auto last = static_cast<int>(coarse.grids.size()) - 1;
+    const int largest = (kLargestMeasuredFactor << last) / ChunkGrid::kSide;
+    const auto write = [&](int chunks, std::int64_t row, std::span<const BlockSum> sums) {
+      const int factor = chunks * ChunkGrid::kSide / kLargestMeasuredFactor;
+      CoarseAverages::Grid& grid =
+          coarse.grids[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(factor)))];
+      WriteMeans(sums.first(static_cast<std::size_t>(grid.columns)), grid.heights.data() + row * grid.columns);
+    };
+    if (largest > 1) {
+      BlockSums blocks(DivideUp(columns, largest), largest);
+      for (int row = 0; row < rows; ++row) {
+        blocks.AddRow(std::span(largest_sums_).subspan(IndexAt(0, row, columns), static_cast<std::size_t>(columns)),
+                      write);
       }
-      std::ranges::transform(sums, grid.heights.begin(), &BlockSum::Mean);
+      blocks.Finish(write);
     }
     AddCoarseErrors(layout_, coarse, statistics_.errors);
     return {};

@@ -26,7 +26,7 @@ namespace terrace::dem {
 namespace {
 
 // Increases with every change of the format or its meaning.
-constexpr std::uint32_t kCacheVersion = 8;
+constexpr std::uint32_t kCacheVersion = 9;
 constexpr std::uint64_t kFooterMagic = 0x44'4e'45'53'54'41'54'53;  // "STATSEND"
 constexpr std::uint32_t kChunkMagic = 0x4b'4e'48'43;               // "CHNK"
 constexpr std::size_t kHeaderBytes = 36, kChunkHeaderBytes = 32, kFooterBytes = 24;

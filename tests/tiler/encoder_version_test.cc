@@ -20,9 +20,9 @@ namespace {
 
 // Recorded results for the sample datasets. If bytes change on purpose, raise kEncoderVersion and copy the values that
 // the test prints.
-constexpr int kRecordedVersion = 10;
+constexpr int kRecordedVersion = 11;
 constexpr const char* kRecordedWith =
-    "encoder 10, GDAL 3.6.2, PROJ 9.1.1, Draco 1.5.5, meshoptimizer 180, libjpeg 62, libwebp 10204, libdeflate 1.14, "
+    "encoder 11, GDAL 3.6.2, PROJ 9.1.1, Draco 1.5.5, meshoptimizer 180, libjpeg 62, libwebp 10204, libdeflate 1.14, "
     "zlib 1.2.13, brotli 1000009, zstd 1.5.4";
 constexpr const char* kRecordedBytes = "\"19133c555765ba046b68bbf6b53656ca\"";
 constexpr const char* kRecordedMapBytes = "\"c9f2e3480baa79a7a914545e7ab3576b\"";

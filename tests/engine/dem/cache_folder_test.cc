@@ -365,7 +365,7 @@ TEST(CacheFolder, FilesThatDoNotFitAreMadeAnewAndSaidOnce) {
       {"empty", ""},
       {"foreign", std::string(5000, 'x')},
       {"of an older version", with_header(8, 3)},
-      {"of a newer version", with_header(8, 9)},
+      {"of a newer version", with_header(8, 10)},
       {"of other averages", with_header(12, 64)},
       {"of another raster", with_header(16, static_cast<char>(good[16] ^ 1))},
   };
