@@ -31,7 +31,7 @@ struct WaterOptions {
 // The image of the textures of GLB tiles and of image tiles for maps. `texture` and `side` are for GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
-  // The texture if a client names none, and of bakes. TilePipeline does not read it, but TileRequest::texture.
+  // The default of TileRequest::texture, for the server and bakes. TilePipeline::Build uses the request's.
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;
   int side = 512;    // pixels along a tile's edge, at most: a power of two, 64 .. 1024
   int quality = 80;  // of JPEG and lossy WebP, 1 .. 100
@@ -50,8 +50,9 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
-  // `compression` is that of GLB tiles if a client names none, of bakes, and of DrawnSurface. TilePipeline does not
-  // read it, but TileRequest::compression. It sets the copyright, the texture, `draco.uv` and both errors itself.
+  // `compression` is the default of TileRequest::compression, for the server and bakes, and of
+  // DrawnSurface::compression. TilePipeline::Build uses the request's. TilePipeline sets the copyright, the texture,
+  // `draco.uv` and both errors.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, only `baked`
   // An archive of tiles of this dataset, with the same generation if there are sources; null: none.

@@ -39,18 +39,18 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of the heights that a read returns. A conversion may change heights that edits set by millimetres
-// (docs/edits.md).
+// The vertical datum of the heights that a read returns. Heights that edits set may change by millimetres when they are
+// converted (docs/edits.md).
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  // The source's own. The floor is in the datum of the last source, in order of precedence, that has a geoid; without
-  // such a source above the ellipsoid.
+  // The source's own. The floor is in the datum of the last source, in order of precedence, that has a geoid; if no
+  // source has one, it is above the ellipsoid.
   kSource,
 };
 
-class AveragesBudget;
-class CacheFolder;
+class AveragesBudget;  // engine/common/averages_budget.h
+class CacheFolder;     // engine/statistics/cache_folder.h
 
 // Where models keep statistics of rasters, and averages of blocks of samples, from which tiles of low levels are read.
 // With a folder, later calls of Open need not read all samples of a raster again.
@@ -84,7 +84,7 @@ struct DemOptions {
   std::function<void(const Error&)> fault = {};
 };
 
-// How the bytes of files are hashed (file_content.h).
+// How the bytes of files are hashed for fingerprints.
 struct FileContentOptions {
   std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
   std::stop_token stop = {};
