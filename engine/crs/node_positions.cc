@@ -84,7 +84,7 @@ class GridNodes {
     if (georeference_.is_affine() && georeference_.is_geographic_grid()) return ColumnsAndRows();
     positions_.assign(Area(window_.columns, window_.rows), kNowhere);
     FillNodes();
-    return {window_, std::move(positions_)};
+    return {window_, std::move(positions_), extent_};
   }
 
  private:
@@ -105,6 +105,7 @@ class GridNodes {
         for (std::int64_t column = first_column_; column < east; column += size) Fill({column, row, size});
       }
     }
+    extent_.are_all_known &= filled_ == positions_.size();
     FillPoleRows();
   }
 
@@ -130,7 +131,9 @@ class GridNodes {
     for (std::int64_t r = row; r < row + rows; ++r) {
       const double latitude = grid_.Latitude(r);
       for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = {grid_.Longitude(c), latitude};
-      georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
+      const std::span<Position> nodes(At(column, r), static_cast<std::size_t>(columns));
+      georeference_.ToPixels(nodes);
+      Count(ExtentOf(nodes), nodes.size());
     }
   }
 
@@ -224,7 +227,7 @@ class GridNodes {
     const std::array<const double*, kKnots> of_columns = weights_from(part.west - cell.column);
     const auto columns = static_cast<std::size_t>(part.east - part.west);
     for (std::int64_t row = part.south; row < part.north; ++row) {
-      InterpolatePositions(row_at(row), of_columns, {At(part.west, row), columns});
+      Count(InterpolatePositions(row_at(row), of_columns, {At(part.west, row), columns}), columns);
     }
     return true;
   }
@@ -235,13 +238,22 @@ class GridNodes {
   }
   static bool IsAsked(const Position& knot) { return knot.x != kNotAsked.x; }  // NaN: it has no position
 
+  // Adds nodes that were filled to the extent of all.
+  void Count(const PositionExtent& extent, std::size_t nodes) {
+    extent_.Add(extent);
+    filled_ += nodes;
+  }
+
   void FillPoleRows() {
+    bool has_poles = false;
     for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
       if (!grid_.IsPoleRow(row)) continue;
+      has_poles = true;
       Position pole{0, grid_.Latitude(row)};
       georeference_.ToPixels({&pole, 1});
       std::fill_n(At(window_.column, row), window_.columns, pole);
     }
+    if (has_poles) extent_ = ExtentOf(positions_);  // other positions were counted for these nodes
   }
 
   const Georeference& georeference_;
@@ -250,6 +262,8 @@ class GridNodes {
   const NodeWindow window_;
   const double tolerance_;
   std::vector<Position> positions_;
+  PositionExtent extent_;   // of the positions that are filled
+  std::size_t filled_ = 0;  // nodes
 
   // Exact positions of every kKnotSpacing-th node, row by row from the first cell's; cells of 32 nodes and more share
   // them with the cells beside them and with their parts.

@@ -40,8 +40,9 @@ class NodePositions {
   // `x` by column, `y` by row.
   NodePositions(const NodeWindow& window, std::vector<double> x, std::vector<double> y)
       : window_(window), x_(std::move(x)), y_(std::move(y)) {}
-  NodePositions(const NodeWindow& window, std::vector<Position> nodes)
-      : window_(window), nodes_(std::move(nodes)), extent_(ExtentOf(nodes_)) {}
+  // `extent`: of the nodes.
+  NodePositions(const NodeWindow& window, std::vector<Position> nodes, const PositionExtent& extent)
+      : window_(window), nodes_(std::move(nodes)), extent_(extent) {}
   // Positions of lattice nodes. NaN where the source's CRS has no position, and outside `footprint`. The nodes of a
   // pole row share one position unless columns are meridians.
   static NodePositions Of(const Georeference& georeference, const Footprint& footprint, const geo::NodeGrid& grid,

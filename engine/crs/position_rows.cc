@@ -12,11 +12,24 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+// The outermost coordinates seen so far, by lane.
+template <class D>
+struct LaneExtent {
+  D d;
+  hn::Vec<D> min_x = hn::Set(d, std::numeric_limits<double>::infinity()), min_y = min_x;
+  hn::Vec<D> max_x = hn::Neg(min_x), max_y = max_x;
+
+  HWY_INLINE PositionExtent Whole() const {
+    return {{hn::GetLane(hn::MinOfLanes(d, min_x)), hn::GetLane(hn::MinOfLanes(d, min_y))},
+            {hn::GetLane(hn::MaxOfLanes(d, max_x)), hn::GetLane(hn::MaxOfLanes(d, max_y))}};
+  }
+};
+
 // Interpolates as many positions from `first` on as the tag has lanes.
 template <class D>
 HWY_INLINE void InterpolateVector(D d, const std::array<Position, kKnots>& knots,
                                   const std::array<const double*, kKnots>& weights, std::size_t first,
-                                  Position* positions) {
+                                  Position* positions, LaneExtent<D>& extent) {
   auto x = hn::Zero(d), y = x;
   for (std::size_t i = 0; i < std::size_t{kKnots}; ++i) {
     const auto weight = hn::LoadU(d, weights[i] + first);
@@ -24,15 +37,46 @@ HWY_INLINE void InterpolateVector(D d, const std::array<Position, kKnots>& knots
     y = hn::Add(y, hn::Mul(weight, hn::Set(d, knots[i].y)));
   }
   hn::StoreInterleaved2(x, y, d, &positions[first].x);
+  extent.min_x = hn::Min(extent.min_x, x), extent.max_x = hn::Max(extent.max_x, x);
+  extent.min_y = hn::Min(extent.min_y, y), extent.max_y = hn::Max(extent.max_y, y);
 }
 
-void Interpolate(const std::array<Position, kKnots>& knots, const std::array<const double*, kKnots>& weights,
-                 Position* positions, std::size_t count) {
+PositionExtent Interpolate(const std::array<Position, kKnots>& knots, const std::array<const double*, kKnots>& weights,
+                           Position* positions, std::size_t count) {
   const hn::CappedTag<double, 8> wide;
+  const hn::CappedTag<double, 1> narrow;
+  LaneExtent<hn::CappedTag<double, 8>> of_vectors{wide};
+  LaneExtent<hn::CappedTag<double, 1>> of_rest{narrow};
   const std::size_t lanes = hn::Lanes(wide);
   std::size_t i = 0;
-  for (; i + lanes <= count; i += lanes) InterpolateVector(wide, knots, weights, i, positions);
-  for (; i < count; ++i) InterpolateVector(hn::CappedTag<double, 1>(), knots, weights, i, positions);
+  for (; i + lanes <= count; i += lanes) InterpolateVector(wide, knots, weights, i, positions, of_vectors);
+  for (; i < count; ++i) InterpolateVector(narrow, knots, weights, i, positions, of_rest);
+  PositionExtent extent = of_vectors.Whole();
+  extent.Add(of_rest.Whole());
+  return extent;
+}
+
+void Mark(const Position* positions, std::size_t count, const Position& min, const Position& max,
+          std::uint8_t* inside) {
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR  // converts no vectors of bytes
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<std::int32_t, decltype(d)> i32;
+  const hn::Rebind<std::uint8_t, decltype(d)> u8;
+  const auto min_x = hn::Set(d, min.x), min_y = hn::Set(d, min.y), max_x = hn::Set(d, max.x), max_y = hn::Set(d, max.y);
+  const auto one = hn::Set(d, 1.0);
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
+    hn::Vec<decltype(d)> x, y;
+    hn::LoadInterleaved2(d, &positions[i].x, x, y);
+    const auto is_inside =
+        hn::And(hn::And(hn::Ge(x, min_x), hn::Le(x, max_x)), hn::And(hn::Ge(y, min_y), hn::Le(y, max_y)));
+    hn::StoreU(hn::DemoteTo(u8, hn::DemoteTo(i32, hn::IfThenElseZero(is_inside, one))), u8, inside + i);
+  }
+#endif
+  for (; i < count; ++i) {
+    const Position& p = positions[i];
+    inside[i] = (p.x >= min.x) & (p.x <= max.x) & (p.y >= min.y) & (p.y <= max.y);
+  }
 }
 
 // Coordinates in turn, x and y, in the lanes of one vector.
@@ -80,14 +124,20 @@ namespace {
 
 HWY_EXPORT(Interpolate);
 HWY_EXPORT(Extent);
+HWY_EXPORT(Mark);
 
 }  // namespace
 
 static_assert(sizeof(Position) == 2 * sizeof(double));  // x and y alternate in memory
 
-void InterpolatePositions(const std::array<Position, kKnots>& knots, const std::array<const double*, kKnots>& weights,
-                          std::span<Position> positions) {
-  HWY_DYNAMIC_DISPATCH(Interpolate)(knots, weights, positions.data(), positions.size());
+PositionExtent InterpolatePositions(const std::array<Position, kKnots>& knots,
+                                    const std::array<const double*, kKnots>& weights, std::span<Position> positions) {
+  return HWY_DYNAMIC_DISPATCH(Interpolate)(knots, weights, positions.data(), positions.size());
+}
+
+void MarkInside(std::span<const Position> positions, const Position& min, const Position& max,
+                std::span<std::uint8_t> inside) {
+  HWY_DYNAMIC_DISPATCH(Mark)(positions.data(), positions.size(), min, max, inside.data());
 }
 
 PositionExtent ExtentOf(std::span<const Position> positions) {

@@ -127,7 +127,7 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions,
       std::ranges::fill(inside, std::uint8_t{1});
       return inside;
     }
-    std::ranges::transform(positions, inside.begin(), [&](const Position& p) { return std::uint8_t{Holds(box, p)}; });
+    MarkInside(positions, {box.min_x, box.min_y}, {box.max_x, box.max_y}, inside);
     return inside;
   }
   Box last = kNowhereBox;

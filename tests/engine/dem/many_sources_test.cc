@@ -118,7 +118,8 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   std::vector<Position> nodes(reading.cells.positions().nodes().begin(), reading.cells.positions().nodes().end());
   std::fill_n(nodes.begin(), 40, kNowhere);
   const GridAxes axes = reading.cells.axes();
-  reading.cells = NodeCells(NodePositions(reading.cells.positions().window(), std::move(nodes)), axes);
+  const PositionExtent extent = ExtentOf(nodes);
+  reading.cells = NodeCells(NodePositions(reading.cells.positions().window(), std::move(nodes), extent), axes);
   const auto [most, all] = LookAround(grid, reading);
   EXPECT_GT(all, 0U);
   EXPECT_LE(most, 8U);

@@ -53,7 +53,8 @@ class Case {
     for (const double y : y_) {
       for (const double x : x_) nodes.push_back({x, y});
     }
-    return {nodes_, std::move(nodes)};
+    const PositionExtent extent = ExtentOf(nodes);
+    return {nodes_, std::move(nodes), extent};
   }
   const std::vector<std::uint8_t>& wanted() const { return wanted_; }
   bool is_any_wanted() const { return std::ranges::count(wanted_, std::uint8_t{1}) > 0; }

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <random>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -14,6 +17,24 @@
 
 namespace terrace::dem {
 namespace {
+
+PositionExtent OneByOne(std::span<const Position> positions) {
+  PositionExtent extent;
+  for (const Position& p : positions) {
+    if (std::isnan(p.x)) {
+      extent.are_all_known = false;
+      continue;
+    }
+    extent.min = {std::min(extent.min.x, p.x), std::min(extent.min.y, p.y)};
+    extent.max = {std::max(extent.max.x, p.x), std::max(extent.max.y, p.y)};
+  }
+  return extent;
+}
+
+void ExpectSame(const PositionExtent& a, const PositionExtent& b) {
+  EXPECT_EQ(std::tuple(a.min.x, a.min.y, a.max.x, a.max.y, a.are_all_known),
+            std::tuple(b.min.x, b.min.y, b.max.x, b.max.y, b.are_all_known));
+}
 
 TEST(PositionRows, AreSumsOfWeightedKnots) {
   tin::ForEachInstructionSet([] {
@@ -29,7 +50,8 @@ TEST(PositionRows, AreSumsOfWeightedKnots) {
         first[i] = weights[i].data();
       }
       std::vector<Position> positions(count + 1, {7, 8});
-      InterpolatePositions(knots, first, std::span(positions).first(count));
+      const PositionExtent extent = InterpolatePositions(knots, first, std::span(positions).first(count));
+      ExpectSame(extent, OneByOne(std::span(positions).first(count)));
       for (std::size_t k = 0; k < count; ++k) {
         Position sum;
         for (std::size_t i = 0; i < knots.size(); ++i) {
@@ -50,22 +72,36 @@ TEST(PositionRows, ExtentLeavesUnknownPositionsOut) {
     for (std::size_t count = 1; count < 40; ++count) {
       for (const unsigned share : {0U, 4U, 1U}) {  // one in so many is unknown; 0: none
         std::vector<Position> positions(count);
-        PositionExtent expected;
         for (Position& p : positions) {
-          p = {place(random), place(random)};
-          if (share != 0 && random() % share == 0) {
-            p = kNowhere;
-            expected.are_all_known = false;
-            continue;
-          }
-          expected.min = {std::min(expected.min.x, p.x), std::min(expected.min.y, p.y)};
-          expected.max = {std::max(expected.max.x, p.x), std::max(expected.max.y, p.y)};
+          p = share != 0 && random() % share == 0 ? kNowhere : Position{place(random), place(random)};
         }
-        const PositionExtent extent = ExtentOf(positions);
-        ASSERT_EQ(std::tuple(extent.min.x, extent.min.y, extent.max.x, extent.max.y, extent.are_all_known),
-                  std::tuple(expected.min.x, expected.min.y, expected.max.x, expected.max.y, expected.are_all_known));
+        ExpectSame(ExtentOf(positions), OneByOne(positions));
       }
     }
+  });
+}
+
+// Whole numbers, so that many positions lie on the edge of the box.
+TEST(PositionRows, InsideABoxIncludesItsEdge) {
+  tin::ForEachInstructionSet([] {
+    std::mt19937 random(10);
+    std::size_t on_edge = 0;
+    for (std::size_t count = 0; count < 40; ++count) {
+      std::vector<Position> positions(count);
+      for (Position& p : positions) {
+        p = {static_cast<double>(random() % 6), static_cast<double>(random() % 6)};
+        if (random() % 5 == 0) p = kNowhere;
+      }
+      std::vector<std::uint8_t> inside(count + 1, 9);
+      MarkInside(positions, {1, 2}, {4, 3}, std::span(inside).first(count));
+      for (std::size_t k = 0; k < count; ++k) {
+        const Position& p = positions[k];
+        ASSERT_EQ(inside[k], p.x >= 1 && p.x <= 4 && p.y >= 2 && p.y <= 3 ? 1 : 0) << k << " of " << count;
+        on_edge += inside[k] != 0 && (p.x == 1 || p.x == 4) ? 1U : 0U;
+      }
+      ASSERT_EQ(inside.back(), 9) << "beyond the end";
+    }
+    ASSERT_GT(on_edge, 20U);
   });
 }
 
