@@ -70,10 +70,12 @@ struct DemOptions {
   HoleFill holes = HoleFill::kSmooth;
   int max_void_gap = 64;  // samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
-  // GeoJSON files (docs/edits.md), in order. Later edits apply over earlier ones, but leave the holes that those cut.
+  // GeoJSON files (docs/edits.md), in order. Later edits apply over earlier ones, but do not close holes that earlier
+  // ones cut.
   std::vector<std::string> edits = {};
   // Metres, 0 .. 10^6; 0: none. Within this distance of its edges and voids, a source is blended with the next sources
-  // in order of precedence. At most 256 times the spacing of the samples or averages that the level is read from.
+  // in order of precedence. A longer distance than 256 times the spacing of the samples, or averages, that a level is
+  // read from is shortened to that.
   double feather = 0;
   // Called by Open on its threads, one call at a time, with the share done, 0 .. 1. All files have equal shares. The
   // share falls if a raster has to be read again.
@@ -196,8 +198,8 @@ struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };
 
-// How many samples were read for nodes and pixels. A sample of an overview, or an average, counts as one. Voids count
-// also where statistics say that there are only voids, which are not read.
+// How many samples were read for nodes and pixels. A sample of an overview, or an average, counts as one. So does a
+// void that is known from statistics and therefore not read.
 struct SampleCounts {
   std::uint64_t measured = 0;
   std::uint64_t filled = 0;  // voids filled from the heights around them

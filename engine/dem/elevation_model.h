@@ -50,8 +50,8 @@ class ElevationModel {
   const DemInfo& info() const;
 
   // The deepest level that has tiles, at most geo::kMaxLevel. Without edits, it is the first level whose default error
-  // (geo::DefaultError) is at most DemOptions::finest_error; if that is not set, at most a tenth of the finest source's
-  // spacing. Edits that ask for more precision add levels.
+  // (geo::DefaultError) is at most DemOptions::finest_error. If finest_error is not set, it is the first level whose
+  // default error is at most a tenth of the finest source's spacing. Edits that ask for more precision add levels.
   int max_level() const;
   // The deepest level without edits. Deeper levels have tiles only around edits.
   int max_source_level() const;
@@ -60,8 +60,10 @@ class ElevationModel {
 
   // The available tiles of a level: ranges that do not overlap, sorted by row and column. Available are:
   // - tiles that overlap the bounds of a raster, in degrees, if the raster is fine enough for the level
-  // - tiles that edits add, and tiles around them
-  // - the ancestors of these tiles, the siblings of all of them, and both tiles of level 0
+  // - tiles that edits add, and the tiles around those
+  // - the ancestors of all these tiles
+  // - the siblings of all these tiles and ancestors
+  // - both tiles of level 0
   // A level with too many ranges gets fewer and larger ones. So some available tiles lie outside all sources.
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
@@ -137,8 +139,8 @@ class ElevationModel {
   // The same without edits.
   std::uint64_t unedited_fingerprint() const;
 
-  // Whether the file of a source in the cache folder can no longer be read. Its tiles then take longer, until the model
-  // is opened again.
+  // Whether the statistics or averages of a source can no longer be read from the cache folder. Its tiles then take
+  // longer, until the model is opened again.
   bool has_lost_cache() const;
 
   // The files of sources, of their geoid grids and of edits, with their stamps at Open. Grids of PROJ that place

@@ -1,9 +1,9 @@
 // The geometric errors that tiles of each level have.
 //
 // Clients assume a level error of 77,067.34 m / 2^level for EPSG:4326 terrain (CesiumJS TerrainProvider,
-// getEstimatedLevelZeroGeometricErrorForAHeightmap: radius * 2 pi * 0.25 / (65 * 2 roots)). The default error of a
-// level is a fraction (0.5) of it. Around it lies the level's ladder: 41 errors, the steps, a quarter of an octave
-// apart. Requested errors are rounded down to a step, so a tile has at most 41 variants.
+// getEstimatedLevelZeroGeometricErrorForAHeightmap: radius * 2 pi * 0.25 / (65 samples * 2 tiles of level 0)). The
+// default error of a level is a fraction (0.5) of it. Around it lies the level's ladder: 41 errors, the steps, a
+// quarter of an octave apart. Requested errors are rounded down to a step, so a tile has at most 41 variants.
 #pragma once
 
 #include <optional>
@@ -35,7 +35,8 @@ int SnapToLadder(int level, double error_m, double error_fraction = kDefaultErro
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of LevelError, the error that clients assume for the level; finite, > 0
-  // With error_m, on levels less than max_source_level: the larger of error_m and the default error is requested.
+  // With error_m, on levels less than max_source_level: if error_m is less than the default error, the default error is
+  // requested instead. So shallow tiles have no more detail than by default.
   bool at_least = false;
 };
 
@@ -44,7 +45,7 @@ struct ErrorScale {
   double fraction = kDefaultErrorFraction;  // ratio of a level's default error to LevelError
   // The deepest level of the sources; edits may add deeper ones.
   int max_source_level = kMaxLevel;
-  // The step of each level if no error is requested, 0 for levels beyond its end.
+  // By level: the step if no error is requested. Levels without an element have step 0.
   std::span<const int> default_steps = {};
 };
 

@@ -23,7 +23,8 @@ namespace terrace::tiler {
 // (Dataset::generation), neither holds.
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
-  // Dataset::cache_generation() of the dataset in TilePipeline::datasets(), which sets a generation that was left at 0.
+  // Dataset::cache_generation() of the dataset in TilePipeline::datasets(). The pipeline has set a generation that was
+  // left at 0.
   std::uint64_t generation = 0;
   // TileEditsHash (tiler/dataset.h): the edits that the tile depends on. 0 for a dataset that has only baked tiles.
   std::uint64_t edits = 0;

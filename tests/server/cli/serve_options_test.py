@@ -176,15 +176,17 @@ class HangUp(unittest.TestCase):
                 url = re.search(r"http://\S+/", process.stdout.readline())[0]
                 log.rename(log.with_suffix(".1"))
                 process.send_signal(signal.SIGHUP)
-                deadline = time.monotonic() + 30
-                while not log.exists() and time.monotonic() < deadline:
-                    time.sleep(.05)
-                self.assertTrue(log.exists(), "the log was not opened anew")
-                urllib.request.urlopen(url + "readyz", timeout=30).read()
+                deadline, sent = time.monotonic() + 30, 0
+                while not (log.exists() and log.read_text()) and time.monotonic() < deadline:
+                    urllib.request.urlopen(url + "readyz", timeout=30).read()
+                    sent += 1
             finally:
                 process.terminate()
             self.assertEqual(process.wait(60), 0)
+            self.assertTrue(log.exists(), "the log was not opened anew")
             self.assertIn("/readyz", log.read_text())
+            # Requests before the change are in the old file, and none is lost.
+            self.assertEqual((log.with_suffix(".1").read_text() + log.read_text()).count("/readyz"), sent)
 
 
 class Stopping(unittest.TestCase):
