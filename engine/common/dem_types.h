@@ -74,8 +74,8 @@ struct DemOptions {
   // ones cut.
   std::vector<std::string> edits = {};
   // Metres, 0 .. 10^6; 0: none. Within this distance of its edges and voids, a source is blended with the next sources
-  // in order of precedence. A longer distance than 256 times the spacing of the samples, or averages, that a level is
-  // read from is shortened to that.
+  // in order of precedence. On each level, the distance is at most 256 times the spacing of the samples, or averages,
+  // that the level is read from.
   double feather = 0;
   // Called by Open on its threads, one call at a time, with the share done, 0 .. 1. All files have equal shares. The
   // share falls if a raster has to be read again.
@@ -96,8 +96,9 @@ struct FileContentOptions {
 struct DemFile {
   std::string path;
   // Order of precedence: the lowest rank, then the finer source (spacings are rounded to powers of 2^(1/16)), then the
-  // path that sorts first. Files of one rank and one vertical datum that touch on one pixel grid are one source, with
-  // the path of the first of them. The order of the list has no effect.
+  // path that sorts first. Rasters of one rank and one vertical datum that touch on one pixel grid are read as one
+  // raster, with the place in this order of the member that comes first; DemInfo::sources lists each of them. The order
+  // of the list of files has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;

@@ -9,8 +9,9 @@ namespace terrace::dem {
 
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, size = 0, modified_ns = 0;
-  // Time of the last status change (ctime), which a program cannot set back. Part of the fingerprint that cached files
-  // are keyed by. Not compared by ==: a change of permissions must not count as a change of an open file.
+  // Time of the last status change (ctime), which a program cannot set back. Keys of caches of what was read from a
+  // file contain it; fingerprint() of models, images and masks does not. Not compared by ==: a change of permissions
+  // must not count as a change of an open file.
   std::uint64_t status_changed_ns = 0;
 
   friend bool operator==(const FileStamp& a, const FileStamp& b) {

@@ -24,7 +24,7 @@ enum class ErrorCode {
   kOverloaded,  // refused for now: a queue or store is full, memory is short, another process writes to the same folder
   kCancelled,   // stopped: nobody waits for the result, the deadline has passed, or the process ends; or
                 // ElevationModel::OpenFromCache lacks statistics, which only Open computes
-  kInternal,    // a library failed unexpectedly
+  kInternal,    // a library, or terrace itself, failed unexpectedly
 };
 
 // A stable lower-case name for logs: "invalid_argument", "not_found", ...

@@ -42,8 +42,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Like Open, but returns kCancelled if the cache lacks statistics of a file, so it seldom takes long. If another file
-  // has an error, that error is returned instead. With DemOptions::fault, `fault` gets the error, and kCancelled is
-  // returned. The rasters of `replace` edits (docs/edits.md) are opened as by Open.
+  // has an error besides: without DemOptions::fault, that error is returned; with it, `fault` gets the error, and
+  // kCancelled is returned. The rasters of `replace` edits (docs/edits.md) are opened as by Open.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -60,7 +60,7 @@ class ElevationModel {
 
   // The available tiles of a level: ranges that do not overlap, sorted by row and column. Available are:
   // - tiles that overlap the bounds of a raster, in degrees, if the raster is fine enough for the level
-  // - tiles that edits add, and the tiles around those
+  // - tiles that edits add, and around each of them at least the tiles of the level above
   // - the ancestors of all these tiles
   // - the siblings of all these tiles and ancestors
   // - both tiles of level 0

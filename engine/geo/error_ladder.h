@@ -35,8 +35,8 @@ int SnapToLadder(int level, double error_m, double error_fraction = kDefaultErro
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of LevelError, the error that clients assume for the level; finite, > 0
-  // With error_m, on levels less than max_source_level: if error_m is less than the default error, the default error is
-  // requested instead. So shallow tiles have no more detail than by default.
+  // With error_m, on levels less than ErrorScale::max_source_level: if error_m is less than the default error, the
+  // default error is requested instead. So shallow tiles have no more detail than by default.
   bool at_least = false;
 };
 

@@ -36,11 +36,11 @@ enum class Side : std::uint8_t {
 // The error of samples on one border. Let a < b be two neighbouring vertices on the border, counted along increasing x
 // or y, and k a sample between them. Its distance from the chord is
 //   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
-// evaluated in double in exactly this form. Its error is
-//   scale * min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
+// evaluated in double in exactly this form. Its error is scale * e with
+//   e = min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
 // In a field with limits (sample_limits.h), let W be SampleLimits::WeightedError. A sample with a limit and m > 0 has
 //   scale * W(max((m + p) * weight, m + p + step_m))  with p = rounding * |h_b - h_a| / (b - a).
-// All other samples have scale * W(the min above). W puts forced samples first. `weight` makes room for rounding that
+// All other samples have scale * W(e). W puts forced samples first. `weight` makes room for rounding that
 // grows with the error, `padding_m` for the rounding of positions where the border is steepest, `step_m` for half the
 // unit to which heights are rounded at the smallest error, and p for the rounding of positions along the sample's own
 // chord. The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the

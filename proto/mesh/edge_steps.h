@@ -38,9 +38,9 @@ struct EdgeSteps {
 
 // The strictest bound on the errors of samples: on each side, and on the four edges that meet at each corner. It is the
 // tile's error unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared
-// edges and corners. With limits, let M be the least step of the tile's edges. It may be below w, but MakeEdgeSteps
-// keeps it at least w / 8192. If S is w, it is at most 8192 M, so that 16384 M + S <= 24576 M < 32767 M. If S is a
-// neighbour's NeededStep, the proof above holds.
+// edges and corners. With limits, let L be the least step of the tile's edges. It may be below w, but MakeEdgeSteps
+// keeps it at least w / 8192. If S is w, it is at most 8192 L, so that 16384 L + S <= 24576 L < 32767 L. If S is a
+// neighbour's NeededStep, the proof at the top of this file holds.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);

@@ -1,6 +1,7 @@
-// How the quantized-mesh and GLB tiles of a dataset are meshed. Meshes of areas do not use these options. Two kinds of
-// tiles use kDelaunay in any case: those in which an edit cuts a hole, and quantized-mesh tiles in which rounding
-// turned a triangle over. The latter are not compacted either.
+// How the quantized-mesh and GLB tiles of a dataset are meshed. Meshes of areas do not use these options. Some tiles
+// use kDelaunay in any case: those in which an edit cuts a hole; those in which, after rounding, an edge passes between
+// neighbouring vertices; and quantized-mesh tiles in which rounding turned a triangle over, which are not compacted
+// either.
 #pragma once
 
 #include "engine/tin/criterion.h"

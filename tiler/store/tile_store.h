@@ -1,8 +1,8 @@
 // The interface of a cache tier. To add a tier, write a class that implements TileStore, and pass an object to
 // TileTiers.
 //
-// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. The other functions return
-// at once. If its queue is full, Insert drops the value, or waits if the tier is configured so.
+// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert does not, unless the
+// tier is configured to wait while its queue is full; else it then drops the value. The other functions return at once.
 #pragma once
 
 #include <cstdint>
@@ -62,7 +62,8 @@ class StoreBase {
   virtual StoreStats stats() const = 0;
 
   // Erases the values of these tiles, also those that wait to be written, and returns their number. After an error,
-  // values may be left. kCancelled: `stop` was requested. kUnavailable: the medium does not respond.
+  // values may be left. kCancelled: `stop` was requested. kUnavailable: the medium does not respond. kInvalidArgument:
+  // a record is damaged.
   virtual Result<std::size_t> Erase(const TileSelection& selection, const std::stop_token& stop) = 0;
 
   // Returns when everything that was inserted before the call is written or dropped.
