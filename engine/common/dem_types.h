@@ -30,8 +30,8 @@ struct SourceOptions {
 };
 
 // Voids narrower than DemOptions::max_void_gap are filled from their edges. Wider voids are of two kinds: holes have
-// data all around them, collars touch a place without a raster. Where no source has a height, a collar has the floor,
-// and a hole has this surface (docs/decisions/0015-voids.md).
+// data of their source all around them, collars touch a place where their source has no raster. Where no source has a
+// height, a collar has the floor, and a hole has this surface (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
   // A harmonic surface between the surrounding heights. If a raster's voids are too ragged to tell holes from collars,
   // all are collars, and RasterInfo::warnings says so.
@@ -65,7 +65,7 @@ struct DemOptions {
   // Metres, > 0: the deepest level is the first whose default error is at most this (ElevationModel::max_level).
   std::optional<double> finest_error = {};
   // Metres above the ellipsoid, -99,998 .. 99,998: the height where there is no other, which is outside the sources, in
-  // collars, and in holes with HoleFill::kFloor. Default: the smallest height of the sources.
+  // collars, and in holes with HoleFill::kFloor. Default: DemInfo::heights.min without edits.
   std::optional<double> floor = {};
   HoleFill holes = HoleFill::kSmooth;
   int max_void_gap = 64;  // samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled
@@ -81,8 +81,8 @@ struct DemOptions {
   // share falls if a raster has to be read again.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // makes Open return kCancelled
-  // Called on the thread of Open for each file that cannot be opened. Open then goes on with the other files, and
-  // returns the first of these errors at the end. Empty: Open ends at the first error.
+  // Called on the thread of Open for each file that cannot be opened, after all files were tried. Open then returns the
+  // error of the first of them in the list. Empty: Open ends at the first error.
   std::function<void(const Error&)> fault = {};
 };
 

@@ -32,10 +32,10 @@ class ElevationModel {
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
   //
   // Errors; the message names the file, the fault and the remedy:
-  // - kNotFound: a file does not exist, or a raster has no height. Files with skip_if_no_raster only cause it if all
-  //   files are skipped, or none has a height.
-  // - kInvalidArgument: an option, a reference system, a raster or an edit cannot be used, or a file of edits cannot be
-  //   read.
+  // - kNotFound: a file does not exist; a raster without skip_if_no_raster has no height; all files were skipped, or
+  //   none has a height.
+  // - kInvalidArgument: an option, a reference system, a raster or an edit cannot be used, or a file or a raster of an
+  //   edit cannot be read.
   // - kUnavailable: a file cannot be read now.
   // - kChanged: a file was replaced meanwhile.
   // - kCancelled: DemOptions::stop was requested.
@@ -53,7 +53,7 @@ class ElevationModel {
   // (geo::DefaultError) is at most DemOptions::finest_error. If finest_error is not set, it is the first level whose
   // default error is at most a tenth of the finest source's spacing. Edits that ask for more precision add levels.
   int max_level() const;
-  // The deepest level without edits. Deeper levels have tiles only around edits.
+  // What max_level() would be without edits. Deeper levels have tiles only around edits.
   int max_source_level() const;
   // Precondition: 0 .. geo::kMaxLevel.
   geo::Lattice LatticeOf(int level) const;
@@ -71,8 +71,8 @@ class ElevationModel {
   bool IsAvailable(const geo::TileKey& key) const;
 
   // A range that contains all heights of the tile's samples, without the halo (TileHeights). Computed from statistics,
-  // without reading. Where the tile has neither a source nor an edit, the range is the floor. Precondition: a valid
-  // key. May throw ThrownError.
+  // not from samples. Statistics that are not in memory are read from the cache folder, or computed again. If the tile
+  // has neither a source nor an edit, the range is the floor. Precondition: a valid key. May throw ThrownError.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid. Precondition: a valid key.
@@ -95,7 +95,7 @@ class ElevationModel {
   // of Read. DemInfo::max_mercator_depth is the first depth as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
-  // Like ReadMercator, but NaN instead of the floor, and with a choice of datum: kEllipsoid, or kSource for maps that
+  // Like ReadMercator, but NaN instead of the floor. Precondition: `datum` is kEllipsoid, or kSource for maps that
   // print heights, such as contours.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
@@ -103,13 +103,13 @@ class ElevationModel {
   // Heights at the sources' full resolution: bilinear between samples, rounded to 2^-10 m, in the order of `points`. A
   // height does not depend on the other points. At the poles, all longitudes have one height, as in tiles. Voids are
   // filled as in tiles; a feather has no effect. Edits apply. NaN:
-  // - outside the sources, in collars, and in holes with HoleFill::kFloor, unless an edit sets the height and `datum`
-  //   is kEllipsoid
   // - in holes that edits cut
-  // - where the geoid that a conversion needs has no value
-  // `filled` is empty or has one element for each point. An element is set to 1 if the sample nearest to the point is
-  // void in the source that gives the height, else to 0. Preconditions: finite longitudes, latitudes in -90 .. 90.
-  // Errors: those of Read; kInvalidArgument: kOrthometric needs EGM96, and PROJ lacks its grid.
+  // - where no source has a height, unless an edit sets it and `datum` is kEllipsoid
+  // A source has no height outside its rasters, in its collars, in its holes with HoleFill::kFloor, and where the geoid
+  // that a conversion needs has no value. `filled` is empty or has one element for each point. An element is set to 1
+  // if the sample nearest to the point is void in the source that gives the height, else to 0. Preconditions: finite
+  // longitudes, latitudes in -90 .. 90. Errors: those of Read; kInvalidArgument: kOrthometric needs EGM96, and PROJ
+  // lacks its grid.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

@@ -31,12 +31,13 @@ double LadderError(int level, int step, double error_fraction = kDefaultErrorFra
 // finite.
 int SnapToLadder(int level, double error_m, double error_fraction = kDefaultErrorFraction);
 
-// The error that a client or a bake requests. At most one of error_m and fraction is set; none: the default error.
+// The error that a client or a bake requests. At most one of error_m and fraction is set; none: the step of
+// ErrorScale::default_steps.
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of LevelError, the error that clients assume for the level; finite, > 0
-  // With error_m, on levels less than ErrorScale::max_source_level: if error_m is less than the default error, the
-  // default error is requested instead. So shallow tiles have no more detail than by default.
+  // With error_m, on levels less than ErrorScale::max_source_level: the larger of error_m and DefaultError is
+  // requested.
   bool at_least = false;
 };
 

@@ -57,9 +57,9 @@ class Imagery {
                                                const FileContentOptions& content = {});
   ~Imagery();
 
-  // Returns the number of pixels along the edge of a level's tiles. It is `max_side`, halved as often as possible so
-  // that it stays at least 256 and the pixels stay as fine as those of the image. Precondition: `max_side` is a power
-  // of two, kMinSide .. kMaxSide.
+  // Returns the number of pixels along the edge of a level's tiles. It is `max_side`, halved as long as the result is
+  // at least 256 and the pixels are as fine as those of the image. Precondition: `max_side` is a power of two, kMinSide
+  // .. kMaxSide.
   int SideOf(int level, int max_side) const;
 
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. Pixels are

@@ -47,7 +47,7 @@ struct EncodedTile {
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kNone;
-  // The store where TileTiers found it (StoreBase::name); null: it was built.
+  // The store that it came from when TileTiers put it into memory (StoreBase::name); null: it was built.
   const char* found_in = nullptr;
   HeaderLines header_lines;  // written by the HeaderWriter of TileTiers; empty without one
 };
