@@ -61,16 +61,18 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   // N: quantized-mesh tiles of levels 0, N, 2N, ... have the metadata extension if it is requested. It lists the tiles
-  // of the N levels below. From level max_source_level() on, a tile without children has none. 0: no tile has it.
+  // of the N levels below. From level max_source_level() on, a tile without children has no metadata. 0: no tile has
+  // it.
   int metadata_availability = 0;
-  // Identifies the dataset and its contents, edits included, in keys of caches: GenerationOf(dataset,
-  // model->fingerprint()). 0: TilePipeline sets it to the dataset's position in datasets(), from 1. In another
-  // pipeline, the same position means another dataset. So this dataset must not share a RefinementCache, TileTiers or
-  // TileStore with another pipeline, neither at the same time nor later.
+  // Identifies the dataset and its contents, edits included: GenerationOf(dataset, model->fingerprint()). 0:
+  // TilePipeline sets it to the dataset's position in datasets(), from 1. In another pipeline, the same position may
+  // mean another dataset. So this dataset must not share a RefinementCache, TileTiers or TileStore with another
+  // pipeline, neither at the same time nor later.
   std::uint64_t generation = 0;
-  // GenerationOf(dataset, model->unedited_fingerprint()); 0: there are no edits. If it is set, keys of caches have this
-  // generation, and a hash of the edits that the tile depends on. So a change of an edit leaves other tiles valid.
+  // GenerationOf(dataset, model->unedited_fingerprint()); 0: there are no edits.
   std::uint64_t unedited_generation = 0;
+  // The generation in keys of caches. A dataset with edits has its unedited_generation there, and keys also have a hash
+  // of the edits that the tile depends on (TileEditsHash). So a change of an edit leaves other tiles valid.
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   geo::ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`
 };

@@ -28,10 +28,10 @@ class RefinementCache;
 // results are virtual, so that tests can replace them.
 //
 // Heights and refinements of tiles are kept between builds, up to `refinement_cache_bytes`; 0: none. A refinement is
-// the record of the samples that greedy insertion added to a mesh, in their order. A kept tile in another format or
-// coding, or with a larger error, is made from the record. For a smaller error, more samples are inserted. The bytes of
-// a tile do not depend on what is kept. ReadDrawnPoints and LookAlong keep meshes besides, up to 32 MiB, and take up to
-// 256 MiB more during a call.
+// the record of the samples that greedy insertion added to a mesh, in their order. A kept tile in the other format with
+// a mesh, in another coding, or with a larger error, is made from the record. For a smaller error, more samples are
+// inserted. The bytes of a tile do not depend on what is kept. ReadDrawnPoints and LookAlong keep meshes besides, up to
+// 32 MiB, and take up to 256 MiB more during a call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
@@ -49,8 +49,9 @@ class TilePipeline {
   // - kNotFound: there is no such dataset; a key outside the tiling scheme of the format; a quantized-mesh or GLB tile
   //   that is not available; heights, a hillshade, slopes or contours deeper than DemInfo::max_mercator_depth; imagery
   //   without an image; without sources, a tile that the archive lacks.
-  // - kInvalidArgument: `error_step`, `side_px` or a member of `map` that the format uses is out of its range.
-  // - kUnavailable: a source cannot be read now.
+  // - kInvalidArgument: `error_step`, `side_px` or a member of `map` that the format uses is out of its range; a
+  //   texture or a tile of the image needs too many pixels of the image at once.
+  // - kUnavailable: a source, the water mask, the image or the archive cannot be read now.
   // - kChanged: a file of a source, of the water mask or of the image was replaced, so the dataset has to be opened
   //   again.
   // - kInternal: an encoder failed.
@@ -63,8 +64,9 @@ class TilePipeline {
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
   // The normals of the surface of ReadPoints: unit vectors east, north, up. Slopes are those between the heights at
-  // half the finest source's spacing on both sides of the point. NaN where the point has no height, or where both
-  // places on one axis have none. Errors: those of ReadPoints.
+  // half the finest source's spacing on both sides of the point. NaN where the point has no height, where neither the
+  // place to the west nor the one to the east has one, or where neither the place to the south nor the one to the north
+  // has one. Errors: those of ReadPoints.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
@@ -74,7 +76,7 @@ class TilePipeline {
   // - kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in tiles whose meshes
   //   take more than 256 MiB.
   // - kNotFound: there is no such dataset; without sources: a surface of kGlb, or an archive without quantized-mesh
-  // tiles.
+  //   tiles.
   // - Others: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,

@@ -53,7 +53,8 @@ class AveragesBudget;  // engine/common/averages_budget.h
 class CacheFolder;     // engine/statistics/cache_folder.h
 
 // Where models keep statistics of rasters, and averages of blocks of samples, from which tiles of low levels are read.
-// With a folder, later calls of Open need not read all samples of a raster again.
+// With a folder, later calls of Open need not read all samples of a raster again, as long as its files and the options
+// do not change.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};     // null: none
   std::shared_ptr<AveragesBudget> memory = {};  // for averages that the folder does not keep; null: none
@@ -214,8 +215,8 @@ struct TileHeights {
   int stride = 0;              // cells + 3
   std::vector<float> heights;  // stride * stride
   // Metres: an upper bound of the vertical distance between two things: the surface that is bilinear between the tile's
-  // samples without the halo, and every valid sample of the sources at full resolution, after the edits that apply to
-  // it. Where sources are blended, it also holds for the blended heights. Infinite: no bound is known.
+  // samples without the halo, and every valid sample of the sources at full resolution, with the edits that apply to
+  // that sample. Where sources are blended, it also holds for the blended heights. Infinite: no bound is known.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

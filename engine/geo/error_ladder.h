@@ -2,8 +2,9 @@
 //
 // Clients assume a level error of 77,067.34 m / 2^level for EPSG:4326 terrain (CesiumJS TerrainProvider,
 // getEstimatedLevelZeroGeometricErrorForAHeightmap: radius * 2 pi * 0.25 / (65 samples * 2 tiles of level 0)). The
-// default error of a level is a fraction (0.5) of it. Around it lies the level's ladder: 41 errors, the steps, a
-// quarter of an octave apart. Requested errors are rounded down to a step, so a tile has at most 41 variants.
+// default error of a level is a fraction (0.5) of it. The errors that tiles of a level may have are 41 steps, the
+// ladder: from 16 times the default error down to a 64th of it, each 2^(1/4) times the next. A requested error is
+// rounded down to a step; if it is below the finest step, it becomes that step.
 #pragma once
 
 #include <optional>
@@ -26,9 +27,9 @@ double DefaultError(int level, double error_fraction = kDefaultErrorFraction);
 // Metres: DefaultError * 2^(-step / 4). Precondition: kCoarsestStep <= step <= kFinestStep.
 double LadderError(int level, int step, double error_fraction = kDefaultErrorFraction);
 
-// Returns the step with the largest error that is at most `error_m`; the finest step if all are larger. Errors within
-// one part in 10^9 of a step count as that step, so that a printed error returns its step. Precondition: error_m > 0,
-// finite.
+// Returns the step with the largest error that is at most `error_m`; the finest step if all steps are larger. Errors
+// within one part in 10^9 of a step count as that step, so that a printed error returns its step. Precondition: error_m
+// > 0, finite.
 int SnapToLadder(int level, double error_m, double error_fraction = kDefaultErrorFraction);
 
 // The error that a client or a bake requests. At most one of error_m and fraction is set; none: the step of

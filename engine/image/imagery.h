@@ -47,7 +47,8 @@ class Imagery {
   // - grey, with or without alpha
   // - a palette
   // - bands that state that they are red, green and blue
-  // - 3 or 4 bands that state nothing; the first three are taken as red, green and blue
+  // - 3 or 4 bands that do not; the first three are taken as red, green and blue, unless one states a colour of another
+  //   model, such as cyan
   //
   // `path` is resolved at each use. `around`: the bounds of the dataset (DemInfo::bounds). kNotFound: there is no such
   // file. kInvalidArgument, with the remedy: no raster that may be opened, no georeference, other bands or samples, or

@@ -19,8 +19,8 @@ class WaterRaster {
  public:
   static constexpr int kSide = 256;  // pixels along a tile's edge
 
-  // Opens band 1 of a georeferenced raster. Parameters and errors: those of Imagery::Open, except that all bands and
-  // samples are accepted.
+  // Opens band 1 of a georeferenced raster. Parameters and errors: those of Imagery::Open, except that any number of
+  // bands is accepted, and any type of samples but complex numbers.
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();
@@ -30,9 +30,10 @@ class WaterRaster {
   // pixel depends only on its level and global position.
   //
   // A sample counts as 1 (water) if it is not zero, else as 0. If the raster is finer than the pixels, these values are
-  // averaged. If it is coarser, they are interpolated; the coast is the line at one half, as sharp as the pixels allow.
-  // Overviews are read if they have the mask of the raster. Make them with `gdaladdo -r nearest` or `-r mode`: other
-  // methods make samples along the coast that are not zero, and would count as water.
+  // averaged. If it is coarser, these values are interpolated. The coast is the line where the result is one half, and
+  // is as sharp as the pixels allow. Overviews are read if they have the mask of the raster. Make them with the method
+  // nearest or mode of gdaladdo: other methods make samples along the coast that are not zero, and would count as
+  // water.
   //
   // Precondition: a valid key. kUnavailable: the raster cannot be read now. kChanged: a file was replaced. kCancelled:
   // `stop` was requested.

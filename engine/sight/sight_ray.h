@@ -27,7 +27,7 @@ struct SightAnswer {
   // The smallest height of the ray above the surface, over the whole ray with its ends; negative if the ray passes
   // below the surface. NaN: there is no surface anywhere along the ray.
   double clearance_m = std::numeric_limits<double>::quiet_NaN();
-  double clearance_at = 0;  // where it is smallest, as a share of the ray's length
+  double clearance_at = 0;  // the place of this height, as a share of the ray's length
   // The first place where the ray is more than kSightTolerance below the surface, as a share of its length.
   std::optional<double> blocked_at;
   bool has_gaps = false;  // parts of the ray are above places without a height

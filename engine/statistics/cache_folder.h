@@ -14,7 +14,8 @@ namespace terrace::dem {
 // reason. The path is resolved at each use.
 //
 // If the budget is short, files that no model of this object uses are removed, the least recently used first. Files in
-// use may fill the whole budget. Files that terrace did not write are neither counted nor removed.
+// use may fill the whole budget. Other files are neither counted nor removed: those that terrace did not write, and the
+// hashes of large files (FileContentOptions).
 class CacheFolder {
  public:
   static constexpr std::uint64_t kUnbounded = ~std::uint64_t{0};

@@ -62,7 +62,7 @@ std::optional<std::string> DiskStore::Find(const std::string& key) {
       return *std::move(record);
     }
     Forget(key);
-  } else if (!record && record.error().code == ErrorCode::kInvalidArgument) {
+  } else if (!record && record.error().code == ErrorCode::kInternal) {
     Forget(key);
   } else if (!record) {
     errors_.fetch_add(1, std::memory_order_relaxed);

@@ -56,8 +56,7 @@ class DiskStore {
 
   // Erases the records whose keys begin with one of `prefixes` and that `is_chosen` accepts, also those that wait to be
   // written. Blocks for reads and writes. Returns their number. kUnavailable: the store is switched off, or the disk
-  // failed. kInvalidArgument: a record is damaged. kCancelled: `stop` was requested. After an error records may be
-  // left.
+  // failed. kInternal: a record is damaged. kCancelled: `stop` was requested. After an error records may be left.
   Result<std::size_t> Erase(const std::vector<std::string>& prefixes,
                             const std::function<bool(std::string_view key)>& is_chosen,
                             const std::stop_token& stop = {});

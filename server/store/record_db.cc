@@ -23,7 +23,7 @@ rocksdb::Slice SliceOf(std::string_view text) { return {text.data(), text.size()
 
 tl::unexpected<Error> Fail(const rocksdb::Status& status) {
   const bool damaged = status.IsCorruption();
-  return MakeError(damaged ? ErrorCode::kInvalidArgument : ErrorCode::kUnavailable, "{}", status.ToString());
+  return MakeError(damaged ? ErrorCode::kInternal : ErrorCode::kUnavailable, "{}", status.ToString());
 }
 
 // Records are deleted with their file, so a file should be a small part of the capacity. More files make look-ups

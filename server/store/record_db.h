@@ -58,8 +58,7 @@ class RecordDb {
   // kUnavailable: the disk does not respond, or the store is open.
   static Result<void> Destroy(const RecordDbOptions& options);
 
-  // Nothing if there is no such record. kInvalidArgument: the record is damaged. kUnavailable: the disk does not
-  // respond.
+  // Nothing if there is no such record. kInternal: the record is damaged. kUnavailable: the disk does not respond.
   Result<std::optional<std::string>> Get(std::string_view key) const;
 
   struct Change {
@@ -70,8 +69,8 @@ class RecordDb {
   Result<void> Write(std::span<const Change> changes);
 
   // Erases the records whose keys begin with `prefix` and that `is_chosen` accepts. Reads all that begin with it.
-  // Returns their number. kCancelled: `stop` was requested. kInvalidArgument: a record is damaged. kUnavailable: as
-  // Write. After an error records may be left.
+  // Returns their number. kCancelled: `stop` was requested. kInternal: a record is damaged. kUnavailable: as Write.
+  // After an error records may be left.
   Result<std::size_t> EraseIf(std::string_view prefix, const std::function<bool(std::string_view key)>& is_chosen,
                               const std::stop_token& stop = {});
 

@@ -51,9 +51,9 @@ Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fractio
 // longitude, latitude and height. In space, vertices are rounded to 2^-10 m.
 //
 // EncodedTile::max_error_m is the largest vertical distance between a sample and these triangles. Triangles in holes
-// count too, although the file does not have them. For a sample that is a vertex, the distance from its rounded
-// position counts if it is smaller: rounding moves a vertex sideways, and beside a steep triangle the vertical distance
-// is then large. Rounding to 32 bits in a GLB is not included.
+// count too, although the file does not have them. For a sample that is a vertex, the smaller of two distances counts:
+// to the triangles, and to the rounded position of the vertex. The reason: rounding moves a vertex sideways, and beside
+// a steep triangle the vertical distance is then large. Rounding to 32 bits in a GLB is not included.
 //
 // Precondition: `plan` is PlanArea's for this model and area. kInvalidArgument: all of the area lies in a hole that
 // edits cut, or the mesh exceeds the limits of the file format. Other errors: those of ElevationModel::ReadNodes.

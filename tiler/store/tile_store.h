@@ -1,8 +1,9 @@
 // The interface of a cache tier. To add a tier, write a class that implements TileStore, and pass an object to
 // TileTiers.
 //
-// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert does not, unless the
-// tier is configured to wait while its queue is full; else it then drops the value. The other functions return at once.
+// Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network. Insert puts the value into a
+// queue. If the queue is full, it drops the value, or waits if the tier is configured so. The other functions return at
+// once.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +19,9 @@
 
 namespace terrace::tiler {
 
-// A request, and what its tile depends on besides. With the generation of GenerationOf, keys stay valid while other
-// datasets are added or removed, and a replaced source never gets tiles of the old one. With a position as generation
-// (Dataset::generation), neither holds.
+// A request, and what its tile depends on besides. If the generation comes from GenerationOf, keys stay valid while
+// other datasets are added or removed, and a dataset whose source was replaced never gets tiles of the old source. If
+// the generation is a position (Dataset::generation), neither holds.
 struct CacheKey {
   TileRequest request;  // its `dataset` is 0
   // Dataset::cache_generation() of the dataset in TilePipeline::datasets(). The pipeline has set a generation that was
@@ -62,8 +63,8 @@ class StoreBase {
   virtual StoreStats stats() const = 0;
 
   // Erases the values of these tiles, also those that wait to be written, and returns their number. After an error,
-  // values may be left. kCancelled: `stop` was requested. kUnavailable: the medium does not respond. kInvalidArgument:
-  // a record is damaged.
+  // values may be left. kCancelled: `stop` was requested. kUnavailable: the medium does not respond. kInternal: a
+  // record is damaged.
   virtual Result<std::size_t> Erase(const TileSelection& selection, const std::stop_token& stop) = 0;
 
   // Returns when everything that was inserted before the call is written or dropped.

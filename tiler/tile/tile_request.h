@@ -43,7 +43,7 @@ struct TileRequest {
   int error_step = 0;
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
-  // kGlb only; no effect without an image. In a dataset without sources, the texture that the archive's tiles have.
+  // kGlb only; no effect without an image. In a dataset without sources, it must be the texture of the archive's tiles.
   proto::TextureFormat texture = proto::TextureFormat::kNone;
   Coding coding = Coding::kIdentity;
   // kQuantizedMesh only. A tile made from sources has those of them that the dataset has for this tile. In a dataset
