@@ -70,12 +70,13 @@ void Mark(const Position* positions, std::size_t count, const Position& min, con
     hn::LoadInterleaved2(d, &positions[i].x, x, y);
     const auto is_inside =
         hn::And(hn::And(hn::Ge(x, min_x), hn::Le(x, max_x)), hn::And(hn::Ge(y, min_y), hn::Le(y, max_y)));
-    hn::StoreU(hn::DemoteTo(u8, hn::DemoteTo(i32, hn::IfThenElseZero(is_inside, one))), u8, inside + i);
+    const auto mark = hn::DemoteTo(u8, hn::DemoteTo(i32, hn::IfThenElseZero(is_inside, one)));
+    hn::StoreU(hn::Or(mark, hn::LoadU(u8, inside + i)), u8, inside + i);
   }
 #endif
   for (; i < count; ++i) {
     const Position& p = positions[i];
-    inside[i] = (p.x >= min.x) & (p.x <= max.x) & (p.y >= min.y) & (p.y <= max.y);
+    inside[i] |= (p.x >= min.x) & (p.x <= max.x) & (p.y >= min.y) & (p.y <= max.y);
   }
 }
 

@@ -35,7 +35,7 @@ PositionExtent ExtentOf(std::span<const Position> positions);
 PositionExtent InterpolatePositions(const std::array<Position, kKnots>& knots,
                                     const std::array<const double*, kKnots>& weights, std::span<Position> positions);
 
-// Sets the element of each position to 1 if it lies in the box from `min` to `max`, ends included, else to 0.
+// Sets the elements of positions in the box from `min` to `max`, ends included, to 1, and leaves the others.
 void MarkInside(std::span<const Position> positions, const Position& min, const Position& max,
                 std::span<std::uint8_t> inside);
 

@@ -115,39 +115,37 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
 }
 
 std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions, const PositionExtent& known) const {
-  // Up to this number, boxes are checked one by one; for more, the index is used.
+  // Up to this number, each box is compared with all positions; for more, the index is used.
   constexpr std::size_t kFewBoxes = 8;
   std::vector<std::uint8_t> inside(positions.size());
   const Box extent{known.min.x, known.min.y, known.max.x, known.max.y};
   if (extent.min_x > extent.max_x) return inside;
+  const auto box_of = [&](std::size_t i) { return Grown(BoxOf(boxes_[i]), kEdgeTolerance); };
   const std::vector<std::size_t> near = index_.Find(Grown(extent, 2 * kEdgeTolerance));
-  if (near.size() == 1) {
-    const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);
-    if (known.are_all_known && Holds(box, known.min) && Holds(box, known.max)) {
-      std::ranges::fill(inside, std::uint8_t{1});
-      return inside;
+  if (near.size() <= kFewBoxes) {
+    for (const std::size_t i : near) {
+      const Box box = box_of(i);
+      if (known.are_all_known && Holds(box, known.min) && Holds(box, known.max)) {
+        std::ranges::fill(inside, std::uint8_t{1});
+        return inside;
+      }
+      MarkInside(positions, {box.min_x, box.min_y}, {box.max_x, box.max_y}, inside);
     }
-    MarkInside(positions, {box.min_x, box.min_y}, {box.max_x, box.max_y}, inside);
     return inside;
   }
   Box last = kNowhereBox;
-  const auto holds_any = [&](const std::vector<std::size_t>& boxes, const Position& p) {
-    for (const std::size_t i : boxes) {
-      const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
-      if (!Holds(box, p)) continue;
-      last = box;
-      return true;
-    }
-    return false;
-  };
   for (std::size_t n = 0; n < positions.size(); ++n) {
     const Position& p = positions[n];
     if (std::isnan(p.x) || std::isnan(p.y)) continue;
-    const bool holds =
-        Holds(last, p) ||  // neighbours are usually in the same box
-        (near.size() <= kFewBoxes ? holds_any(near, p)
-                                  : holds_any(index_.Find(Grown({p.x, p.y, p.x, p.y}, 2 * kEdgeTolerance)), p));
-    inside[n] = holds ? 1 : 0;
+    inside[n] = Holds(last, p) ? 1 : 0;  // neighbours are usually in the same box
+    if (inside[n] != 0) continue;
+    for (const std::size_t i : index_.Find(Grown({p.x, p.y, p.x, p.y}, 2 * kEdgeTolerance))) {
+      const Box box = box_of(i);
+      if (!Holds(box, p)) continue;
+      last = box;
+      inside[n] = 1;
+      break;
+    }
   }
   return inside;
 }

@@ -179,6 +179,43 @@ float HeightAt(const ElevationModel& model, double longitude, double latitude) {
   return height ? height->front() : -1e9f;
 }
 
+// A staircase of twelve rasters in UTM: nodes beside them, within the extent of all, have the floor.
+TEST(Mosaic, OnlyNodesInRaggedPiecesHaveTheirHeights) {
+  constexpr int kPieces = 12;
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (int i = 0; i < kPieces; ++i) {
+    RasterSpec piece = Seconds(40, 20);
+    piece.geo_transform = {300000.0 + i * 600, 30, 0, 3800000.0 - i * 600, 0, -30};
+    piece.crs = "EPSG:32611";
+    piece.value = [](int, int) { return 100.0; };
+    files.push_back({WriteRaster(dir, piece, "step" + std::to_string(i) + ".tif")});
+  }
+  DemOptions options;
+  options.floor = 0;
+  const auto model = OpenOrFail(files, options);
+  ASSERT_TRUE(model);
+  const GeoBounds& bounds = model->info().bounds;
+  const geo::Lattice lattice = model->LatticeOf(model->max_level());
+  const auto line = [&](double degrees) { return static_cast<std::int64_t>(degrees / lattice.StepDegrees()); };
+  const NodeWindow window{line(bounds.west + 180) - 2, line(bounds.south + 90) - 2,
+                          static_cast<int>(line(bounds.east - bounds.west) + 6),
+                          static_cast<int>(line(bounds.north - bounds.south) + 6)};
+  const auto nodes = model->ReadNodes(lattice.level, window);
+  ASSERT_TRUE(nodes);
+  int inside = 0, outside = 0;
+  for (std::size_t n = 0; n < nodes->size(); ++n) {
+    const auto columns = static_cast<std::size_t>(window.columns);
+    const GeoPosition point{lattice.Longitude(window.column + static_cast<std::int64_t>(n % columns)),
+                            lattice.Latitude(window.row + static_cast<std::int64_t>(n / columns))};
+    const bool is_inside = !std::isnan(HeightAt(*model, point.longitude, point.latitude));
+    ASSERT_EQ((*nodes)[n], is_inside ? 100 : 0) << point.longitude << " " << point.latitude;
+    (is_inside ? inside : outside) += 1;
+  }
+  EXPECT_GT(inside, 1000);
+  EXPECT_GT(outside, 1000);
+}
+
 // Height of the node nearest to a position, in tiles of the level.
 float NodeAt(const ElevationModel& model, int level, double longitude, double latitude) {
   const geo::Lattice lattice = model.LatticeOf(level);
