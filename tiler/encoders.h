@@ -36,7 +36,8 @@ struct Encoder {
 // encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: a source, the
 // water raster or the image cannot be read now. kChanged: a file of them was replaced. kCancelled: stopped. kInternal:
 // a library failed, or a triangle turned over. kNotFound: heights, hillshades, slopes and contours deeper than
-// max_mercator_depth; imagery of a dataset without an image.
+// max_mercator_depth; imagery of a dataset without an image. kInvalidArgument: too many pixels of the image are needed
+// at once.
 Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> MakeGlbTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);

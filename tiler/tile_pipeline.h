@@ -28,10 +28,10 @@ class RefinementCache;
 // results are virtual, so that tests can replace them.
 //
 // Heights and refinements of tiles are kept between builds, up to `refinement_cache_bytes`; 0: none. A refinement is
-// the record of the samples that greedy insertion added to a mesh, in their order. A kept tile in the other format with
-// a mesh, in another coding, or with a larger error, is made from the record. For a smaller error, more samples are
-// inserted. The bytes of a tile do not depend on what is kept. ReadDrawnPoints and LookAlong keep meshes besides, up to
-// 32 MiB, and take up to 256 MiB more during a call.
+// the record of the samples that greedy insertion added to a mesh, in their order. Build makes a quantized-mesh or GLB
+// tile from a kept refinement, in any coding, if the tile's error is the same or larger. If it is smaller, Build
+// inserts more samples. The bytes of a tile do not depend on what is kept. ReadDrawnPoints and LookAlong keep meshes
+// besides, up to 32 MiB, and take up to 256 MiB more during a call.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,

@@ -34,9 +34,9 @@ class ElevationModel {
   // Errors; the message names the file, the fault and the remedy:
   // - kNotFound: a file does not exist; a raster without skip_if_no_raster has no height; all files were skipped, or
   //   none has a height.
-  // - kInvalidArgument: an option, a reference system, a raster or an edit cannot be used, or a file or a raster of an
-  //   edit cannot be read.
-  // - kUnavailable: a file cannot be read now.
+  // - kInvalidArgument: an option, a reference system, a raster or an edit cannot be used, or an edit's GeoJSON file or
+  //   raster cannot be read.
+  // - kUnavailable: a file of a source cannot be read now.
   // - kChanged: a file was replaced meanwhile.
   // - kCancelled: DemOptions::stop was requested.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});

@@ -28,9 +28,8 @@ class RequestReader {
  public:
   RequestReader(Stream& stream, ReadTimeouts timeouts);
 
-  // Returns nothing if the connection has ended, was idle for too long, or no request came within the grace of
-  // EndSoon.
-  // `now`: the current time, or shortly before.
+  // Returns nothing if the connection has ended, was idle for too long, or no request had begun by the `close_at` of
+  // EndSoon. `now`: the current time, or shortly before.
   using HeadOutcome = std::optional<tl::expected<void, BadRequest>>;
   asio::awaitable<HeadOutcome> ReadHead(Request& request, Stream::Clock::time_point now);
 

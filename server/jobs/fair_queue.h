@@ -33,8 +33,8 @@ struct JobTerms {
   std::uint64_t kind = 0;  // jobs of one kind take about the same time
 };
 
-// The terms of work for one request other than a tile. A client's short work runs before its tiles, its long work after
-// them. They have kinds of their own, below kFirstTileKind.
+// The terms of work for one request other than a tile. Short work has the order of a tile of level 0, long work that of
+// a tile of level 40. They have kinds of their own, below kFirstTileKind.
 JobTerms ShortTerms(JobClock::time_point deadline, std::uint64_t client);
 JobTerms LongTerms(JobClock::time_point deadline, std::uint64_t client);
 inline constexpr std::uint64_t kFirstTileKind = 2;
