@@ -44,7 +44,7 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
     const std::int64_t width = std::min(columns.count() - first, blocks * block);
     const double last = ShareOf(first + width - 1, step, columns.samples());
     const bool is_plain = block == 1 && width == blocks;
-    BlockSums sums(blocks, block);
+    BlockSums sums(width, block);
     std::int64_t done = 0;  // rows of values
     const auto visit = [&](int side, std::int64_t row, std::span<const BlockSum> of_blocks) {
       if (side == block) WriteMeans(of_blocks, out + row * window.columns);

@@ -45,9 +45,12 @@ void WriteMeans(std::span<const BlockSum> sums, float* means);
 // smaller blocks.
 class BlockSums {
  public:
-  // `blocks`: of `block` x `block` values, beside each other. `block`: a power of two.
-  BlockSums(std::int64_t blocks, int block) {
-    for (int side = 2; side <= block; side *= 2) levels_.emplace_back(static_cast<std::size_t>(blocks * block / side));
+  // `values`: of a row. `block`: a power of two. There are as many sums of a side as blocks that the row reaches.
+  BlockSums(std::int64_t values, int block) {
+    for (int side = 2; side <= block; side *= 2) {
+      values = (values + 1) / 2;
+      levels_.emplace_back(static_cast<std::size_t>(values));
+    }
   }
 
   // Adds a row of samples with weight `weight`. The last sample has `weight` * `last`: it may cover fewer pixels. Calls

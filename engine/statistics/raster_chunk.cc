@@ -143,7 +143,7 @@ BlocksOfChunk SumBlocks(const Samples& samples, const Chunk& chunk, const Raster
     std::vector<BlockSum>& to = blocks.sums[index_of(side)];
     to.insert(to.end(), sums.begin(), sums.begin() + DivideUp(used, factor));
   };
-  BlockSums large(1, ChunkGrid::kSide / kLargestMeasuredFactor);
+  BlockSums large(DivideUp(used, kLargestMeasuredFactor), ChunkGrid::kSide / kLargestMeasuredFactor);
   for (int factor = 2; factor <= largest; factor *= 2) {
     const GridWindow window = AveragesAround(chunk, layout, factor);
     blocks.averages.push_back({window, std::vector<float>(static_cast<std::size_t>(window.columns * window.rows))});
@@ -163,7 +163,7 @@ BlocksOfChunk SumBlocks(const Samples& samples, const Chunk& chunk, const Raster
                               static_cast<std::size_t>(DivideUp(used, factor))),
                  add_sums);
   };
-  BlockSums small(DivideUp(width, largest), largest);
+  BlockSums small(width, largest);
   for (int row = box.row; row < box.row + box.rows; ++row) small.AddRow(samples.Row(row), width, 1, 1, add_averages);
   small.Finish(add_averages);
   large.Finish(add_sums);

@@ -296,7 +296,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
       WriteMeans(sums.first(static_cast<std::size_t>(grid.columns)), grid.heights.data() + row * grid.columns);
     };
     if (largest > 1) {
-      BlockSums blocks(DivideUp(columns, largest), largest);
+      BlockSums blocks(columns, largest);
       for (int row = 0; row < rows; ++row) {
         blocks.AddRow(std::span(largest_sums_).subspan(IndexAt(0, row, columns), static_cast<std::size_t>(columns)),
                       write);

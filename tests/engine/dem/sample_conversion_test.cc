@@ -132,6 +132,7 @@ TEST(BlockSums, AreSumsOfQuartersDownToSamples) {
         std::size_t checked = 0;
         const auto check = [&](int side_of, std::int64_t row, std::span<const BlockSum> sums) {
           const auto side = static_cast<std::size_t>(side_of);
+          EXPECT_EQ(sums.size(), (columns + side - 1) / side) << "no sums beyond the row";
           for (std::size_t c = 0; c * side < columns; ++c, ++checked) {
             const BlockSum expected = of.Sum(c * side, static_cast<std::size_t>(row) * side, side);
             EXPECT_EQ(sums[c].sum, expected.sum) << side << ' ' << row << ' ' << c;
@@ -139,12 +140,12 @@ TEST(BlockSums, AreSumsOfQuartersDownToSamples) {
           }
         };
         // The larger half of the sizes is summed from the sums of the smaller half.
-        const std::size_t inner = block > 8 ? 8 : block, blocks = (columns + block - 1) / block;
-        BlockSums large(static_cast<std::int64_t>(blocks), static_cast<int>(block / inner));
+        const std::size_t inner = block > 8 ? 8 : block;
+        BlockSums large(static_cast<std::int64_t>((columns + inner - 1) / inner), static_cast<int>(block / inner));
         const auto check_large = [&](int side, std::int64_t row, std::span<const BlockSum> sums) {
           check(side * static_cast<int>(inner), row, sums);
         };
-        BlockSums small(static_cast<std::int64_t>(blocks * block / inner), static_cast<int>(inner));
+        BlockSums small(static_cast<std::int64_t>(columns), static_cast<int>(inner));
         const auto check_small = [&](int side, std::int64_t row, std::span<const BlockSum> sums) {
           check(side, row, sums);
           if (side == static_cast<int>(inner) && block > inner) large.AddRow(sums, check_large);
