@@ -29,9 +29,10 @@ struct SourceOptions {
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
 };
 
-// Voids narrower than DemOptions::max_void_gap are filled from their edges. Wider voids are of two kinds: holes have
-// data of their source all around them, collars touch a place where their source has no raster. Where no source has a
-// height, a collar has the floor, and a hole has this surface (docs/decisions/0015-voids.md).
+// Voids narrower than DemOptions::max_void_gap are filled from their edges. Wider voids are of two kinds. A collar
+// touches the rim of its raster or, if rasters are read as one (DemFile::rank), a pixel that none of them has. A hole
+// has data all around it. Where no source has a height, a collar has the floor, and a hole has what this option says
+// (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
   // A harmonic surface between the surrounding heights. If a raster's voids are too ragged to tell holes from collars,
   // all are collars, and RasterInfo::warnings says so.
@@ -216,7 +217,8 @@ struct TileHeights {
   std::vector<float> heights;  // stride * stride
   // Metres: an upper bound of the vertical distance between two things: the surface that is bilinear between the tile's
   // samples without the halo, and every valid sample of the sources at full resolution, with the edits that apply to
-  // that sample. Where sources are blended, it also holds for the blended heights. Infinite: no bound is known.
+  // that sample. Where sources overlap, samples that a source earlier in order of precedence hides do not count. Where
+  // sources are blended, the bound also holds for the blended heights. Infinite: no bound is known.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

@@ -60,7 +60,8 @@ class ElevationModel {
 
   // The available tiles of a level: ranges that do not overlap, sorted by row and column. Available are:
   // - tiles that overlap the bounds of a raster, in degrees, if the raster is fine enough for the level
-  // - tiles that edits add, and around each of them at least the tiles of the level above
+  // - tiles that edits add, and tiles around them: on each side of such a tile is one of its level or of the level
+  //   above
   // - the ancestors of all these tiles
   // - the siblings of all these tiles and ancestors
   // - both tiles of level 0

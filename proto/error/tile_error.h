@@ -18,8 +18,8 @@ struct TileError {
   // because rounding moved it along a steep triangle; once its neighbours are vertices, the triangles around it are no
   // steeper than the ground. Empty if nothing can be inserted, whatever max_m is.
   std::vector<tin::SamplePosition> to_insert;
-  // Nothing can be inserted, but a vertex exceeds the bound because an edge separates it from a vertex at the next
-  // sample. A Delaunay triangulation has no such edges.
+  // Nothing can be inserted, but a vertex exceeds the bound because a side of a triangle passes between it and a vertex
+  // at a neighbouring sample. A Delaunay triangulation has no such sides.
   bool is_cut_through = false;
 };
 

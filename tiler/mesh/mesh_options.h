@@ -1,8 +1,8 @@
 // How the quantized-mesh and GLB tiles of a dataset are meshed. Meshes of areas do not use these options. Exceptions:
 // - A tile in which an edit cuts a hole uses kDelaunay.
 // - A quantized-mesh tile in which rounding turned a triangle over uses kDelaunay and is not compacted.
-// - Rounding may push a vertex over the error while an edge separates it from a vertex at the next sample. Then the
-//   vertices are triangulated again by kDelaunay.
+// - After rounding, a vertex may be farther from its sample than the error permits, because a side of a triangle passes
+//   between it and a vertex at a neighbouring sample. Then all vertices are triangulated again by kDelaunay.
 #pragma once
 
 #include "engine/tin/criterion.h"

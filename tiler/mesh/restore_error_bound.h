@@ -14,10 +14,10 @@ namespace terrace::tiler {
 // Rounds the vertices of a mesh as its format does, and measures the decoded mesh.
 using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
-// Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. If an edge
-// separates a vertex that exceeds the bound from a vertex at the next sample (TileError::is_cut_through), triangulates
-// the vertices again, by Delaunay, and goes on. Returns the measurement of the final mesh. The largest error exceeds
-// the bound only in these cases:
+// Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. If a side of a
+// triangle passes between a vertex that exceeds the bound and a vertex at a neighbouring sample
+// (TileError::is_cut_through), triangulates all vertices again, by Delaunay, and goes on. Returns the measurement of
+// the final mesh. The largest error exceeds the bound only in these cases:
 // - Rounding moved a vertex away from its sample, and all neighbouring samples are vertices already. The excess is at
 //   most the change of the ground over the distance that the vertex was moved.
 // - The format rounds heights. The excess is at most that.

@@ -39,8 +39,8 @@ struct EncodedTile {
   // BuildAreaMesh says. Of other formats: 0.
   double max_error_m = 0;
   // Metres, the Terrain-Certified-Error header: an upper bound of the vertical distance between this mesh and every
-  // sample of the sources, with the edits that apply to that sample. Only quantized-mesh and GLB tiles have it.
-  // Infinite: no bound is known.
+  // visible sample of the sources (TileHeights::source_error_m), with the edits that apply to that sample. Only
+  // quantized-mesh and GLB tiles have it. Infinite: no bound is known.
   std::optional<double> certified_error_m = {};
   // Of the encoded mesh; in GLB tiles with the skirts. Formats without a mesh: 0.
   std::uint32_t vertices = 0;

@@ -46,8 +46,8 @@ struct TileRequest {
   // kGlb only; no effect without an image. In a dataset without sources, it must be the texture of the archive's tiles.
   proto::TextureFormat texture = proto::TextureFormat::kNone;
   Coding coding = Coding::kIdentity;
-  // kQuantizedMesh only. A tile made from sources has those of them that the dataset has for this tile. In a dataset
-  // without sources, the archive's tile must have all of them.
+  // kQuantizedMesh only: the extensions that are wanted. A tile made from sources lacks those that the dataset does not
+  // have for it. In a dataset without sources, the archive's tile must have all of them.
   proto::TileExtensions extensions;
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
   // Pixels along an edge, of kHeightPng and of all map layers but kContours. In Web Mercator, tiles of 256 pixels have
