@@ -61,8 +61,8 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   // N: quantized-mesh tiles of levels 0, N, 2N, ... have the metadata extension if it is requested. It lists the tiles
-  // of the N levels below. From level max_source_level() on, a tile without children has no metadata. 0: no tile has
-  // it.
+  // of the next N deeper levels. From level max_source_level() on, a tile without children has no metadata. 0: no tile
+  // has it.
   int metadata_availability = 0;
   // Identifies the dataset and its contents, edits included: GenerationOf(dataset, model->fingerprint()). 0:
   // TilePipeline sets it to the dataset's position in datasets(), from 1. In another pipeline, the same position may

@@ -72,7 +72,7 @@ class TilePipeline {
                                                                 std::stop_token stop) const;
 
   // Heights, and with `normals` also normals, of the meshes that clients decode. NaN in holes that edits cut. Where the
-  // level has no tile, the mesh of the deepest available tile of a lower level is read. Errors:
+  // level has no tile, the mesh of the deepest available tile of a shallower level is read. Errors:
   // - kInvalidArgument: the dataset has no such level; the points lie in more than 64 tiles, or in tiles whose meshes
   //   take more than 256 MiB.
   // - kNotFound: there is no such dataset; without sources: a surface of kGlb, or an archive without quantized-mesh

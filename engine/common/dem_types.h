@@ -99,8 +99,8 @@ struct DemFile {
   std::string path;
   // Order of precedence: the lowest rank, then the finer source (spacings are rounded to powers of 2^(1/16)), then the
   // path that sorts first. Rasters of one rank and one vertical datum that touch on one pixel grid are read as one
-  // raster, with the place in this order of the member that comes first; DemInfo::sources lists each of them. The order
-  // of the list of files has no effect.
+  // raster. Its place in this order is that of its first member. DemInfo::sources lists the members one by one. The
+  // order of the list of files has no effect.
   int rank = 0;
   // For files of a folder: a file that is no raster is skipped, and one without any height is no error.
   bool skip_if_no_raster = false;

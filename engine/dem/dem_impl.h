@@ -68,8 +68,8 @@ class ElevationModel::Impl {
   Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
   // Of an edit with orthometric heights. dem_edit_datum.cc.
   Result<std::string> AddUndulations(Edit& edit) const;
-  // Whether, in reads in `datum`, all heights that an edit with this reach may touch count from `geoid` (GeoidIn):
-  // those of the sources there, and with kSource the floor. dem_edit_datum.cc.
+  // Whether all heights in the box `reach`, read in `datum`, are above `geoid` (GeoidIn): those of the sources there,
+  // and with kSource the floor. dem_edit_datum.cc.
   bool AreHeightsAbove(const std::string& geoid, HeightDatum datum, const Box& reach) const;
   // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.
@@ -139,7 +139,7 @@ class ElevationModel::Impl {
   void KeepHash(const HashKey& key, std::uint64_t hash) const;
 };
 
-// The geoid that a source's heights count from in a datum, by its PROJ operation; empty: none.
+// The PROJ operation of the geoid above which a source's heights are when they are read in a datum; empty: none.
 std::string GeoidIn(HeightDatum datum, const VerticalDatum& source);
 
 // A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.

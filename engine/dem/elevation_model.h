@@ -60,8 +60,8 @@ class ElevationModel {
 
   // The available tiles of a level: ranges that do not overlap, sorted by row and column. Available are:
   // - tiles that overlap the bounds of a raster, in degrees, if the raster is fine enough for the level
-  // - tiles that edits add, and tiles around them: on each side of such a tile is one of its level or of the level
-  //   above
+  // - tiles that edits add, and tiles around them: on each side of such a tile is a tile of its level or of the next
+  //   shallower one
   // - the ancestors of all these tiles
   // - the siblings of all these tiles and ancestors
   // - both tiles of level 0
@@ -117,8 +117,8 @@ class ElevationModel {
 
   // Lines of sight over the surface of ReadPoints, without edits and without rounding; one answer for each ray. Heights
   // of rays are above the ellipsoid. Preconditions: finite positions on Earth; rays no longer than kMaxSightLength.
-  // Errors: those of ReadPoints; kInvalidArgument: a ray passes above the box around an edit that changes heights or
-  // cuts a hole. A ray that passes within 125 m of the box may also be refused.
+  // Errors: those of ReadPoints; kInvalidArgument: a ray crosses, in longitude and latitude, the box around an edit
+  // that changes heights or cuts a hole. A ray that passes within 125 m of the box may also be refused.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

@@ -31,7 +31,7 @@ struct FinerTiles {
 std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const SourceExtent> sources);
 
 // Adds tiles to a result of AvailableTiles, also on deeper levels, with the ancestors and siblings that the rules above
-// ask for. A tile that is added has tiles of its level or the one above it on all sides, because skirts hide gaps
+// ask for. A tile that is added has tiles of its level or the next shallower one on all sides, because skirts hide gaps
 // between neighbours that differ by one level (proto/mesh/skirt.h). Returns the tiles that were added, by level from 0,
 // as ranges without overlap; empty if `finer` is.
 std::vector<std::vector<geo::TileRange>> AddTiles(std::vector<std::vector<geo::TileRange>>& levels,

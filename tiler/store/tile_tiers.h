@@ -1,7 +1,7 @@
 // The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order. The tier
 // that has it fills the tiers above. If none has it, it is built, and goes into all of them. A store may drop it.
-// Memory does not keep a tile that is larger than a 16th of `memory_bytes`, or, if `memory_bytes` is below 64 MiB, than
-// all of it.
+// Memory does not keep very large tiles. The limit is a 16th of `memory_bytes`; if `memory_bytes` is below 64 MiB, it
+// is `memory_bytes`.
 //
 // Thread-safe. Two threads that ask for the same tile at once may both build it.
 #pragma once
