@@ -57,6 +57,12 @@ Footprint Normalized(Footprint box) {
 
 }  // namespace
 
+bool HasUnknownOutline(const Georeference& georeference) {
+  std::vector<Position> outline = Outline(georeference.width(), georeference.height());
+  georeference.ToDegrees(outline);
+  return std::ranges::any_of(outline, [](const Position& p) { return !std::isfinite(p.x) || !std::isfinite(p.y); });
+}
+
 Footprint Footprint::Of(const Georeference& georeference) {
   std::vector<Position> outline = Outline(georeference.width(), georeference.height());
   georeference.ToDegrees(outline);

@@ -44,4 +44,7 @@ Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, c
 // share only an edge with it do not overlap it.
 std::vector<geo::TileRange> TilesOverlapping(const Footprint& footprint, int level);
 
+// Whether a position on the edge of the raster cannot be computed.
+bool HasUnknownOutline(const Georeference& georeference);
+
 }  // namespace terrace::dem

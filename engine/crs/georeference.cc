@@ -2,6 +2,7 @@
 
 #include <cpl_conv.h>
 #include <cpl_string.h>
+#include <fmt/core.h>
 #include <ogr_spatialref.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 
 #include "engine/core/plain_number.h"
 #include "engine/gdal/sample_rules.h"
+#include "engine/geo/ellipsoid.h"
 
 namespace terrace::dem {
 namespace {
@@ -90,6 +92,12 @@ std::string CanonicalWkt(const OGRSpatialReference& horizontal) {
   return Wkt(horizontal);
 }
 
+// GRS 80 counts: the two differ by 0.1 mm.
+bool HasEllipsoidOfWgs84(const OGRSpatialReference& srs) {
+  return std::abs(srs.GetSemiMajor() - geo::kSemiMajorAxis) < 0.01 &&
+         std::abs(srs.GetInvFlattening() - 298.257223) < 1e-4;
+}
+
 // Name and unit of the vertical datum, if the CRS states them.
 std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs) {
   if (srs.IsCompound() != 0) {
@@ -100,8 +108,10 @@ std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs)
     const bool is_unknown = name != nullptr && EQUAL(name, "unknown");
     return {is_unknown ? "" : name == nullptr ? "unnamed" : name, unit == nullptr ? "" : unit};
   }
-  if (srs.GetAxesCount() == 3) return {"ellipsoid", UnitOfHeightAxis(srs)};
-  return {};
+  if (srs.GetAxesCount() != 3) return {};
+  const char* const ellipsoid = srs.GetAttrValue("SPHEROID");
+  return {HasEllipsoidOfWgs84(srs) ? "ellipsoid" : fmt::format("ellipsoid {}", ellipsoid == nullptr ? "?" : ellipsoid),
+          UnitOfHeightAxis(srs)};
 }
 
 // Whether the file's x is the latitude or northing, which most formats of GDAL put into y.
@@ -338,7 +348,8 @@ void Georeference::FindTurn() {
 
 void Georeference::FindPeriod(const OGRSpatialReference& srs) {
   full_circle_ = 2 * std::numbers::pi / srs.GetAngularUnits(static_cast<const char**>(nullptr));
-  if (to_crs_[2] != 0 || to_crs_[4] != 0) return;
+  // The meridians of a rotated pole are no meridians of the Earth.
+  if (to_crs_[2] != 0 || to_crs_[4] != 0 || srs.IsDerivedGeographic() != 0) return;
   period_ = std::abs(full_circle_ / to_crs_[1]);
   const double whole = std::round(period_);
   // A pixel size of 0.008333333333 means 1/120: up to a hundredth of a pixel around the Earth counts as no gap.

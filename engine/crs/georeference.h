@@ -66,7 +66,8 @@ class Georeference {
   bool is_affine() const { return projector_ == nullptr; }
   // Whether the CRS is geographic: its coordinates are longitudes and latitudes.
   bool is_geographic() const { return is_geographic_; }
-  // Whether the CRS is geographic and the raster is not rotated: columns follow meridians. Rows may run either way.
+  // Whether columns follow meridians: the CRS is geographic, and neither the raster nor the pole is rotated. Rows may
+  // run either way.
   bool is_geographic_grid() const { return period_ > 0; }
   bool columns_run_east() const { return to_crs_[1] > 0; }
   // The number of columns in 360 degrees; 0 if this is not a geographic grid.

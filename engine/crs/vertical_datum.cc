@@ -47,6 +47,12 @@ Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georefere
     return Above(Geoid::OfGrid(wanted, centre));
   }
   if (!stated.vertical_crs().empty()) return AboveCrs(stated.vertical_crs(), centre);
+  if (stated.vertical_datum().starts_with("ellipsoid ")) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "its heights are above the {}, not above that of WGS 84; convert them with `gdalwarp -t_srs "
+                     "EPSG:4979 in out.tif`{}",
+                     stated.vertical_datum(), kWayOut);
+  }
   return VerticalDatum{stated.vertical_datum(), nullptr};
 }
 

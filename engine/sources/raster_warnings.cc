@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/core/plain_number.h"
+#include "engine/crs/footprint.h"
 #include "engine/crs/geoid.h"
 #include "engine/gdal/sample_rules.h"
 
@@ -21,6 +22,17 @@ double BeyondPole(const Georeference& georeference) {
   const double latitude = std::abs(ends[0].y) > std::abs(ends[1].y) ? ends[0].y : ends[1].y;
   const double pixel = std::abs(ends[1].y - ends[0].y) / georeference.height();
   return std::abs(latitude) > 90 + pixel ? latitude : 0;
+}
+
+// How many pixels the centre is away from where its longitude and latitude lead back to; NaN: nowhere.
+double OffCentre(const Georeference& georeference) {
+  const Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
+  std::array<Position, 1> there{centre};
+  georeference.ToDegrees(there);
+  georeference.ToPixels(there);
+  double x = there[0].x - centre.x;
+  if (const double turn = georeference.period(); turn > 0) x -= turn * std::round(x / turn);
+  return std::hypot(x, there[0].y - centre.y);
 }
 
 void WarnOfPosition(const Georeference& georeference, double spacing_m, const RasterLayout& layout,
@@ -43,6 +55,21 @@ void WarnOfPosition(const Georeference& georeference, double spacing_m, const Ra
         fmt::format("PROJ knows no exact way from {} to WGS 84 here ({}): positions may be off by up to some hundred "
                     "metres; warp the raster to a system that PROJ can convert",
                     georeference.crs(), georeference.transform()));
+  }
+  if (HasUnknownOutline(georeference)) {
+    warnings.push_back(
+        fmt::format("places at its rim have no longitude and latitude ({}): they count as outside, and the bounds are "
+                    "those of the whole Earth; cut them off with `gdal_translate -projwin`, or, if a grid of the datum "
+                    "ends inside the raster, warp it with `gdalwarp -t_srs EPSG:4326 in out`",
+                    georeference.transform()));
+  }
+  constexpr double kMaxOffCentre = 1;  // pixels
+  if (!(OffCentre(georeference) <= kMaxOffCentre)) {
+    warnings.push_back(
+        fmt::format("longitude and latitude of its centre do not lead back to it: its coordinates are outside of what "
+                    "{} is for, so heights may be missing; if that is the wrong system, assign the right one with "
+                    "`gdal_translate -a_srs EPSG:XXXX in out`",
+                    georeference.crs()));
   }
   constexpr double kSmallestPixel = 0.005;  // metres; of degrees, 500 m
   if (!georeference.is_geographic() && georeference.MayBeInDegrees() && spacing_m < kSmallestPixel) {

@@ -1,6 +1,7 @@
 // Results of Open, and promises of Read on real rasters.
 #include "engine/dem/elevation_model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -103,6 +104,69 @@ TEST(ElevationModel, CompoundCrsStatesItsVerticalDatum) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().sources[0].vertical_datum, "EGM96 geoid");
   EXPECT_NE(source->info().sources[0].crs.find("UTM zone 11N"), std::string::npos);
+}
+
+// Heights above the ellipsoid of Bessel are up to 50 m from those above that of WGS 84.
+TEST(ElevationModel, ThreeDimensionalCrsOnAnotherEllipsoidIsRefused) {
+  const TempDir dir;
+  RasterSpec spec{.geo_transform = {14, 0.001, 0, 48, 0, -0.001}, .crs = "EPSG:9267"};  // MGI, three-dimensional
+  const auto refused = ElevationModel::Open(WriteRaster(dir, spec, "mgi.tif"));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(refused.error().message.find("Bessel 1841"), std::string::npos) << refused.error().message;
+  DemOptions options;
+  options.source.vertical = "ellipsoid";
+  EXPECT_TRUE(ElevationModel::Open((dir.path() / "mgi.tif").string(), options));
+  spec.crs = "EPSG:4937";  // ETRS89, on GRS 80
+  EXPECT_TRUE(ElevationModel::Open(WriteRaster(dir, spec, "etrs.tif")));
+}
+
+// Rasters with places that their reference system cannot place on Earth say so.
+TEST(ElevationModel, PlacesOutsideTheProjectionAreWarnedOf) {
+  const TempDir dir;
+  const auto has_warning = [&](const RasterSpec& spec, const std::string& text) {
+    const auto model = OpenOrFail(WriteRaster(dir, spec));
+    if (!model) return false;
+    return std::ranges::any_of(model->info().sources[0].warnings,
+                               [&](const std::string& warning) { return warning.find(text) != std::string::npos; });
+  };
+  RasterSpec spec{.width = 300, .height = 300, .geo_transform = {-7e6, 5e4, 0, 7e6, 0, -5e4}};
+  spec.crs = "+proj=ortho +lat_0=50 +lon_0=10 +datum=WGS84 +units=m";  // corners of the map show no part of the Earth
+  EXPECT_TRUE(has_warning(spec, "places at its rim"));
+  spec.geo_transform = {-1e6, 5e3, 0, 1e6, 0, -5e3};
+  EXPECT_FALSE(has_warning(spec, "places at its rim"));
+  EXPECT_FALSE(has_warning(spec, "do not lead back"));
+  // Coordinates of EPSG:5514, whose axes run the other way.
+  EXPECT_TRUE(
+      has_warning({.geo_transform = {-650000, 90, 0, -1100000, 0, -90}, .crs = "EPSG:5513"}, "do not lead back"));
+}
+
+// Columns of a rotated grid are no meridians: it may contain a pole, as those of climate models do.
+TEST(ElevationModel, RotatedPoleGridReachesThePole) {
+  const TempDir dir;
+  RasterSpec spec{.width = 300, .height = 300, .geo_transform = {-3, 0.02, 0, 9.55, 0, -0.02}};
+  spec.crs = "+proj=ob_tran +o_proj=longlat +o_lat_p=6.55 +lon_0=180 +datum=WGS84 +no_defs";
+  spec.value = [](int column, int row) { return 1000.0 + column + 2 * row; };
+  const auto model = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(model, nullptr);
+  EXPECT_EQ(model->info().bounds.north, 90);
+  for (int level = 0; level <= model->max_level(); ++level) {
+    for (std::int64_t x = 0; x < geo::TileColumns(level); ++x) {
+      EXPECT_TRUE(model->IsAvailable({level, x, geo::TileRows(level) - 1})) << level << ' ' << x;
+    }
+  }
+  const geo::Lattice lattice = model->LatticeOf(model->max_level());
+  const NodeWindow beside{0, lattice.rows() - 8, 64, 9};
+  const auto nodes = model->ReadNodes(lattice.level, beside);
+  std::vector<GeoPosition> points;
+  for (int j = 0; j < beside.rows; ++j) {
+    for (int i = 0; i < beside.columns; ++i) points.push_back({lattice.Longitude(i), lattice.Latitude(beside.row + j)});
+  }
+  const auto heights = model->ReadPoints(points);
+  ASSERT_TRUE(nodes && heights);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    EXPECT_NEAR((*nodes)[n], (*heights)[n], 0.01) << points[n].longitude << ' ' << points[n].latitude;
+  }
 }
 
 TEST(ElevationModel, VoidsNeverAppearAsHeights) {
