@@ -80,6 +80,8 @@ class Georeference {
   int height() const { return height_; }
 
   const std::string& crs() const { return crs_; }
+  // The datum that the CRS states: "EGM96 geoid". A three-dimensional CRS states "ellipsoid" for that of WGS 84 and
+  // GRS 80, else "ellipsoid" and its name: "ellipsoid Bessel 1841". Empty: none.
   const std::string& vertical_datum() const { return vertical_datum_; }
   // The compound reference system including the vertical one, as WKT; empty if heights are ellipsoidal or no vertical
   // system is stated.
